@@ -58,6 +58,24 @@ py::array_t<double> project(const Camera& camera, const Rows<double>& points) {
   return copy_to_array<double>(pixels.data(), {points.shape(0), 2});
 }
 
+py::array_t<double> errors(const Camera& camera, const Rows<double>& points,
+                           const Rows<double>& pixels) {
+  check_columns(points, 3, "points");
+  check_columns(pixels, 2, "pixels");
+  if (points.shape(0) != pixels.shape(0)) {
+    throw py::value_error("points and pixels must have the same length");
+  }
+  Eigen::Matrix2Xd all =
+      Eigen::Matrix2Xd::Constant(2, points.shape(0), std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Map<const Eigen::Matrix3Xd> p_c(points.data(), 3, points.shape(0));
+  const Eigen::Map<const Eigen::Matrix2Xd> uv(pixels.data(), 2, pixels.shape(0));
+  for (Eigen::Index i = 0; i < all.cols(); ++i) {
+    Eigen::Vector2d error;
+    if (camera.error(p_c.col(i), uv(0, i), uv(1, i), error)) all.col(i) = error;
+  }
+  return copy_to_array<double>(all.data(), {points.shape(0), 2});
+}
+
 py::array_t<double> rays(const Camera& camera, const Rows<double>& pixels) {
   check_columns(pixels, 2, "pixels");
   const Eigen::Map<const Eigen::Matrix2Xd> uv(pixels.data(), 2, pixels.shape(0));
@@ -110,14 +128,17 @@ void bind_camera_options(py::module_& module) {
   py::class_<CameraOptions> options(module, "CameraOptions", "What a Camera is made from.");
   options
       .def(py::init([](double fx, double fy, double cx, double cy, int width, int height,
-                       const std::vector<double>& distortion, double bf, double depth_ratio) {
+                       const std::vector<double>& distortion, double bf, double depth_ratio,
+                       const std::shared_ptr<CameraModel>& model) {
              const Distortion lens = distortion_of(distortion);
-             return CameraOptions{{fx, fy, cx, cy}, lens, bf, depth_ratio, {width, height}};
+             return CameraOptions{{fx, fy, cx, cy}, lens, bf, depth_ratio, {width, height}, model};
            }),
            py::arg("fx") = 0.0, py::arg("fy") = 0.0, py::arg("cx") = 0.0, py::arg("cy") = 0.0,
            py::arg("width") = 0, py::arg("height") = 0,
            py::arg("distortion") = std::vector<double>{}, py::arg("bf") = 0.0,
-           py::arg("depth_ratio") = 0.0, "Nothing is checked before a Camera is made.")
+           py::arg("depth_ratio") = 0.0, py::arg("model") = nullptr,
+           "`model`: a CameraModel in place of fx, fy, cx, cy and distortion. Nothing is checked\n"
+           "before a Camera is made.")
       .def_property(
           "distortion", [](const CameraOptions& o) { return o.distortion; },
           [](CameraOptions& o, const std::vector<double>& d) { o.distortion = distortion_of(d); },
@@ -145,7 +166,8 @@ void bind_camera(py::module_& module) {
   py::class_<Camera, std::shared_ptr<Camera>>(
       module, "Camera",
       "A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual)\n"
-      "right camera. The plane has undistorted pixels; those of the image itself are called raw.")
+      "right camera. Of a pinhole the plane is flat, without the distortion of the lens; of a\n"
+      "fisheye lens it is the image itself. Pixels of the image are called raw.")
       .def(py::init<const CameraOptions&>(), py::arg("options"),
            "Raises SettingsError when an option is out of range.")
       .def_property_readonly("pinhole", &Camera::pinhole)
@@ -156,6 +178,8 @@ void bind_camera(py::module_& module) {
             return std::pair(camera.image_size().width, camera.image_size().height);
           },
           "(width, height) [px].")
+      .def_property_readonly("is_flat", &Camera::is_flat,
+                             "The image plane is that of a pinhole, not of a fisheye lens.")
       .def_property_readonly(
           "is_rectified", [](const Camera& camera) { return !camera.distorts(); },
           "True when the lens does not distort.")
@@ -169,16 +193,21 @@ void bind_camera(py::module_& module) {
            "Column in the (virtual) right image of a point at column u and depth z [m].")
       .def_property_readonly("pixels_per_radian", &Camera::pixels_per_radian,
                              "Pixels that the image moves in its middle per radian of turning.")
-      .def("project", &project, py::arg("points"),
-           "Undistorted pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN for those\n"
-           "that are not in front of the camera. Bounds are not asked.")
+      .def(
+          "project", &project, py::arg("points"),
+          "Pixels (n, 2) float64 of the plane of points (n, 3) in the camera frame; NaN for those\n"
+          "that are not visible. Bounds are not asked.")
+      .def(
+          "errors", &errors, py::arg("points"), py::arg("pixels"),
+          "Errors (n, 2) float64 [raw px] of the projections of points (n, 3) in the camera frame\n"
+          "against keypoints at pixels (n, 2) of the plane; NaN for those that are not visible.")
       .def("rays", &rays, py::arg("pixels"),
-           "Directions (n, 3) float64 in which undistorted pixels (n, 2) look, as points at depth\n"
-           "1 in the camera frame.")
+           "Directions (n, 3) float64 in which pixels (n, 2) of the plane look: points at depth 1\n"
+           "in the camera frame, for a fisheye lens unit vectors; NaN where it shows nothing.")
       .def("from_image", &from_image, py::arg("raw"),
-           "Undistorted pixels (n, 2) float32 of raw pixels (n, 2).")
+           "Pixels (n, 2) float32 of the plane of raw pixels (n, 2).")
       .def("to_image", &to_image, py::arg("pixels"),
-           "Raw pixels (n, 2) float64 of undistorted pixels (n, 2).");
+           "Raw pixels (n, 2) float64 of pixels (n, 2) of the plane.");
 }
 
 }  // namespace orbslam::bindings

@@ -87,8 +87,8 @@ std::vector<NamedRow> named_rows() {
 void bind_camera_model(py::module_& module) {
   module.def("camera_models", &named_rows,
              "Name, other programs' names and parameter names of each camera model.");
-  py::class_<CameraModel>(module, "CameraModel",
-                          "A central camera of any model, with raw pixels. Immutable.")
+  py::class_<CameraModel, std::shared_ptr<CameraModel>>(
+      module, "CameraModel", "A central camera of any model, with raw pixels. Immutable.")
       .def(py::init([](const std::string& name, const std::vector<double>& parameters, int width,
                        int height) {
              return CameraModel(name, parameters, {width, height});

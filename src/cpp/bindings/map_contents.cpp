@@ -3,6 +3,8 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <array>
+#include <string>
 
 #include "base/errors.hpp"
 #include "base/parallel.hpp"
@@ -32,6 +34,38 @@ py::array_t<bool> flags(std::vector<std::uint8_t>&& values) {
   return owned<bool>(std::move(values));
 }
 
+// Of a camera that CameraOptions::model describes: the number of its model (the place in
+// camera_model_rows(), from 1 on) and all its parameters; 0 and zeros of a pinhole.
+constexpr std::size_t kStoredLensSize = 16;
+using StoredLens = std::array<double, kStoredLensSize>;
+
+std::int64_t model_number_of(const CameraOptions& camera) {
+  return camera.model ? 1 + (&camera.model->row() - camera_model_rows().data()) : 0;
+}
+
+StoredLens stored_lens_of(const CameraOptions& camera) {
+  StoredLens lens{};
+  if (camera.model)
+    std::copy_n(camera.model->parameters().begin(), camera.model->parameters().size(),
+                lens.begin());
+  return lens;
+}
+
+std::shared_ptr<const CameraModel> model_of(std::int64_t number, const StoredLens& lens,
+                                            ImageSize size) {
+  if (number == 0) return nullptr;
+  const auto& rows = camera_model_rows();
+  if (number < 0 || number > static_cast<std::int64_t>(rows.size())) {
+    throw py::value_error("cameras.model: there is no camera model with the number " +
+                          std::to_string(number));
+  }
+  const CameraModelRow& row = rows[static_cast<std::size_t>(number - 1)];
+  const std::size_t n = row.parameters.size();
+  return std::make_shared<CameraModel>(
+      row.name, std::vector<double>(lens.begin(), lens.begin() + static_cast<std::ptrdiff_t>(n)),
+      size);
+}
+
 void put_cameras(py::dict& arrays, const std::vector<CameraContents>& cameras) {
   const auto put = [&](const char* name, auto value_of) {
     using Item = decltype(value_of(cameras.front()));
@@ -47,6 +81,10 @@ void put_cameras(py::dict& arrays, const std::vector<CameraContents>& cameras) {
   std::vector<Distortion> distortion;
   for (const C& c : cameras) distortion.push_back(c.camera.distortion);
   arrays["cameras.distortion"] = owned<double>(std::move(distortion), {8});
+  std::vector<StoredLens> lens;
+  for (const C& c : cameras) lens.push_back(stored_lens_of(c.camera));
+  arrays["cameras.lens"] = owned<double>(std::move(lens), {kStoredLensSize});
+  put("cameras.model", [](const C& c) { return model_number_of(c.camera); });
   put("cameras.bf", [](const C& c) { return c.camera.bf; });
   put("cameras.depth_ratio", [](const C& c) { return c.camera.depth_ratio; });
   put("cameras.width", [](const C& c) { return std::int64_t{c.camera.image_size.width}; });
@@ -224,6 +262,8 @@ void read_cameras(Arrays& arrays, StoredMap& stored) {
              bf = arrays.column<double>("cameras.bf", n),
              ratio = arrays.column<double>("cameras.depth_ratio", n);
   const auto distortion = arrays.column<Distortion, double, 8>("cameras.distortion", n);
+  const auto lens = arrays.column<StoredLens, double, kStoredLensSize>("cameras.lens", n);
+  const auto model = arrays.column<std::int64_t>("cameras.model", n);
   const auto width = arrays.column<std::int64_t>("cameras.width", n),
              height = arrays.column<std::int64_t>("cameras.height", n),
              levels = arrays.column<std::int64_t>("cameras.n_levels", n);
@@ -238,6 +278,7 @@ void read_cameras(Arrays& arrays, StoredMap& stored) {
     camera.bf = bf[i];
     camera.depth_ratio = ratio[i];
     camera.image_size = {small(width[i]), small(height[i])};
+    camera.model = model_of(model[i], lens[i], camera.image_size);
     stored.cameras.push_back({camera, factor[i], small(levels[i])});
   }
 }

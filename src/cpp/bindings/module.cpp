@@ -9,8 +9,8 @@ PYBIND11_MODULE(_core, module) {
   bind_stop_flag(module);
   bind_images(module);
   bind_features(module);
-  bind_camera(module);
   bind_camera_model(module);
+  bind_camera(module);
   bind_frame(module);
   bind_frame_evidence(module);
   bind_map(module);

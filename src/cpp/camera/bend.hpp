@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-
-#include "camera/lens.hpp"
+#include <array>
 
 namespace orbslam {
+
+/// OpenCV's coefficients k1, k2, p1, p2, k3, and k4, k5, k6 of the rational model; zeros: unused.
+using Distortion = std::array<double, 8>;
 
 /// Where the lens shows a point, and how that moves with the point.
 struct Bent {

@@ -2,8 +2,11 @@
 #include "camera/camera.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <variant>
+#include <vector>
 
 #include "base/errors.hpp"
 
@@ -43,10 +46,25 @@ void check(const CameraOptions& options) {
   }
 }
 
+/// A calibration may describe the corners badly, but not the middles of the borders.
+void check_borders(const Camera& camera) {
+  const double right = camera.image_size().width - 1, bottom = camera.image_size().height - 1;
+  const Eigen::Vector2d middles[] = {
+      {0, bottom / 2}, {right, bottom / 2}, {right / 2, 0}, {right / 2, bottom}};
+  for (const Eigen::Vector2d& middle : middles) {
+    if (camera.shows(middle)) continue;
+    throw SettingsError(
+        "the distortion coefficients fold the image over: no direction belongs to pixel (" +
+        std::to_string(middle.x()) + ", " + std::to_string(middle.y()) +
+        "); check k1, k2, p1, p2, k3 to k6 and the focal lengths");
+  }
+}
+
 ImageBounds bounds_of(const Camera& camera) {
   const auto width = static_cast<float>(camera.image_size().width);
   const auto height = static_cast<float>(camera.image_size().height);
   if (!camera.distorts()) return {0, width, 0, height};
+  check_borders(camera);
 
   const Eigen::Vector2f upper_left = camera.from_image({0, 0});
   const Eigen::Vector2f upper_right = camera.from_image({width, 0});
@@ -55,50 +73,135 @@ ImageBounds bounds_of(const Camera& camera) {
   const ImageBounds bounds{
       std::min(upper_left.x(), lower_left.x()), std::max(upper_right.x(), lower_right.x()),
       std::min(upper_left.y(), upper_right.y()), std::max(lower_left.y(), lower_right.y())};
-  if (!(bounds.min_x < bounds.max_x && bounds.min_y < bounds.max_y)) {
-    throw SettingsError(
-        "the distortion coefficients fold the image corners over each other; "
-        "check k1, k2, p1, p2, k3 to k6 and the focal lengths");
-  }
   return bounds;
 }
 
-const CameraOptions& checked(const CameraOptions& options) {
-  check(options);
-  return options;
+/// The pinhole of a model: its own, or for a fisheye lens one with its scale in the middle.
+Pinhole pinhole_of(const CameraModel& model) {
+  const std::vector<double>& p = model.parameters();
+  const Pinhole plane{p[0], p[1], p[2], p[3]};
+  if (is_flat(model.lens())) return plane;
+  Seen seen;
+  if (!model.project({0, 0, 1}, seen)) return plane;
+  return {seen.J(0, 0), seen.J(1, 1), plane.cx, plane.cy};
+}
+
+CameraOptions checked(const CameraOptions& options) {
+  CameraOptions full = options;
+  if (options.model) {
+    const ImageSize own = options.model->image_size();
+    if (own.width != options.image_size.width || own.height != options.image_size.height) {
+      throw SettingsError("the camera model is of images of " + std::to_string(own.width) + "x" +
+                          std::to_string(own.height) + " pixels, not " +
+                          std::to_string(options.image_size.width) + "x" +
+                          std::to_string(options.image_size.height));
+    }
+    full.pinhole = pinhole_of(*options.model);
+    full.distortion = {};
+  }
+  check(full);
+  return full;
+}
+
+LensModel lens_of(const CameraOptions& options) {
+  if (options.model) return options.model->lens();
+  std::array<double, 12> coefficients{};
+  std::copy(options.distortion.begin(), options.distortion.end(), coefficients.begin());
+  const bool bends = std::any_of(coefficients.begin(), coefficients.end(),
+                                 [](double coefficient) { return coefficient != 0; });
+  if (!bends) return lens_models::PinholeLens{options.pinhole};
+  return lens_models::PlaneDistortionLens{options.pinhole, PlaneDistortion(coefficients)};
 }
 
 }  // namespace
 
 Camera::Camera(const CameraOptions& options)
-    : options_(checked(options)), lens_(options.distortion), bounds_(bounds_of(*this)) {
-  if (has_baseline()) close_depth_ = options.bf * options.depth_ratio / options.pinhole.fx;
+    : options_(checked(options)),
+      lens_(lens_of(options_)),
+      flat_(orbslam::is_flat(lens_)),
+      distorts_(std::holds_alternative<lens_models::PlaneDistortionLens>(lens_)),
+      bounds_(bounds_of(*this)) {
+  if (has_baseline()) close_depth_ = options_.bf * options_.depth_ratio / options_.pinhole.fx;
 }
 
-bool Camera::project(const Eigen::Vector3d& p_c, Seen& seen) const {
-  if (!project(p_c, seen.uv)) return false;
-  const Pinhole& k = pinhole();
-  const double inverse_z = 1 / p_c.z();
-  seen.J << k.fx * inverse_z, 0, -k.fx * p_c.x() * inverse_z * inverse_z,  //
-      0, k.fy * inverse_z, -k.fy * p_c.y() * inverse_z * inverse_z;
+bool Camera::project_wide(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const {
+  Seen seen;
+  if (!std::visit([&](const auto& lens) { return lens.project(p_c, seen); }, lens_)) return false;
+  if (!seen.uv.allFinite()) return false;
+  uv = seen.uv;
   return true;
 }
 
-Eigen::Vector2f Camera::from_image(const Eigen::Vector2f& raw) const {
-  if (!distorts()) return raw;
+Eigen::Vector3d Camera::wide_ray(double u, double v) const {
+  Eigen::Vector3d ray;
+  const bool shown = std::visit(
+      [&](const auto& lens) {
+        return lens.unproject({u, v}, ray);
+      },
+      lens_);
+  return shown ? ray : Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+}
+
+Eigen::Matrix2d Camera::raw_by_plane(double u, double v) const {
   const Pinhole& k = pinhole();
-  const double inverse_fx = 1 / k.fx, inverse_fy = 1 / k.fy;
-  const Eigen::Vector2d straight =
-      lens_.straight({(raw.x() - k.cx) * inverse_fx, (raw.y() - k.cy) * inverse_fy});
-  return {static_cast<float>(k.fx * straight.x() + k.cx),
-          static_cast<float>(k.fy * straight.y() + k.cy)};
+  const auto& lens = std::get<lens_models::PlaneDistortionLens>(lens_);
+  Bent bent;
+  // Where the lens shows nothing no error is small.
+  if (!lens.distortion.distort(k.to_plane({u, v}), bent)) {
+    return Eigen::Matrix2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  const double aspect = k.fx / k.fy;
+  Eigen::Matrix2d by_plane = bent.J;
+  by_plane(0, 1) *= aspect;
+  by_plane(1, 0) /= aspect;
+  return by_plane;
+}
+
+Sight Camera::sight(double u, double v) const {
+  const Pinhole& k = pinhole();
+  Sight B;
+  if (flat_) {
+    B << k.fx, 0, k.cx - u, 0, k.fy, k.cy - v, 0, 0, 1;
+    if (distorts_)
+      B.topRows<2>() = raw_by_plane(u, v) * Eigen::Matrix<double, 2, 3>(B.topRows<2>());
+    return B;
+  }
+  const Eigen::Vector3d ray = wide_ray(u, v);
+  Seen seen;
+  const bool shown = ray.allFinite() &&
+                     std::visit([&](const auto& lens) { return lens.project(ray, seen); }, lens_);
+  if (!shown) return Sight::Constant(std::numeric_limits<double>::quiet_NaN());
+  B.topRows<2>() = seen.J;
+  B.row(2) = ray.transpose();
+  return B;
+}
+
+bool Camera::project(const Eigen::Vector3d& p_c, Seen& seen) const {
+  if (!flat_) return std::visit([&](const auto& lens) { return lens.project(p_c, seen); }, lens_);
+  return lens_models::PinholeLens{pinhole()}.project(p_c, seen);
+}
+
+Eigen::Vector2f Camera::from_image(const Eigen::Vector2f& raw) const {
+  if (!distorts_) return raw;
+  const auto& lens = std::get<lens_models::PlaneDistortionLens>(lens_);
+  Eigen::Vector2d straight;
+  if (!lens.distortion.undistort(pinhole().to_plane(raw.cast<double>()), straight)) return raw;
+  return pinhole().to_pixel(straight).cast<float>();
+}
+
+bool Camera::shows(const Eigen::Vector2d& raw) const {
+  Eigen::Vector3d ray;
+  return std::visit([&](const auto& lens) { return lens.unproject(raw, ray); }, lens_);
 }
 
 Eigen::Vector2d Camera::to_image(const Eigen::Vector2d& uv) const {
-  if (!distorts()) return uv;
-  const Pinhole& k = pinhole();
-  const Eigen::Vector2d bent = lens_.bent({(uv.x() - k.cx) / k.fx, (uv.y() - k.cy) / k.fy});
-  return {k.fx * bent.x() + k.cx, k.fy * bent.y() + k.cy};
+  if (!distorts_) return uv;
+  const auto& lens = std::get<lens_models::PlaneDistortionLens>(lens_);
+  Bent bent;
+  if (!lens.distortion.distort(pinhole().to_plane(uv), bent)) {
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return pinhole().to_pixel(bent.at);
 }
 
 }  // namespace orbslam

@@ -3,14 +3,16 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 
 #include "base/scale_pyramid.hpp"
-#include "camera/lens.hpp"
+#include "camera/bend.hpp"
+#include "camera/camera_model.hpp"
 #include "camera/pinhole.hpp"
 
 namespace orbslam {
 
-/// Limits of undistorted pixel coordinates.
+/// Limits of the image plane's pixel coordinates.
 struct ImageBounds {
   float min_x = 0, max_x = 0, min_y = 0, max_y = 0;
 
@@ -30,50 +32,88 @@ struct CameraOptions {
   double bf = 0;            ///< baseline times fx [pixel metre]; 0 for a single camera
   double depth_ratio = 0;   ///< close/far limit in multiples of the baseline (ThDepth)
   ImageSize image_size;     ///< of the first image
+  /// Any camera model, in place of `pinhole` and `distortion`; none: these two.
+  std::shared_ptr<const CameraModel> model;
 };
 
+/// Linear forms that compare a point p in the camera frame with one keypoint: the error of its
+/// projection in raw pixels is (B.row(0) p, B.row(1) p) / (B.row(2) p), exact for a pinhole and to
+/// first order around the keypoint for other lenses. B.row(2) p is positive in front, that is
+/// within 90 degrees of the keypoint's ray or of a pinhole's axis.
+using Sight = Eigen::Matrix3d;
+
 /// A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual) right
-/// camera. The plane has undistorted pixels; those of the image itself are called raw. Immutable,
-/// shared by all frames of a system; nothing of it is global.
+/// camera. Keypoints are pixels of this plane. Of a pinhole it is flat, without the distortion of
+/// the lens; of a fisheye lens it is the image itself. Pixels of the image are called raw.
+/// Immutable, shared by all frames of a system; nothing of it is global.
 class Camera {
  public:
   /// Throws SettingsError when a focal length or the image size is not positive, a coefficient is
-  /// not finite, bf is negative, or there is a baseline without a positive depth_ratio.
+  /// not finite, bf is negative, there is a baseline without a positive depth_ratio, or the model
+  /// is of another image size.
   explicit Camera(const CameraOptions& options);
 
   const CameraOptions& options() const { return options_; }
   ImageSize image_size() const { return options_.image_size; }
 
-  /// What the image plane is made of, for algorithms of the pinhole alone.
+  /// The image plane is that of a pinhole. Otherwise it is the image of a fisheye lens.
+  bool is_flat() const { return flat_; }
+  /// The image itself is that of a pinhole: its errors need no Sight.
+  bool is_pinhole() const { return flat_ && !distorts_; }
+  /// Of a flat plane. For a fisheye lens: the pinhole with its scale in the middle.
   const Pinhole& pinhole() const { return options_.pinhole; }
-  /// Pixel of a point in the camera frame. False, and `uv` stays, for a point that cannot be seen:
-  /// one that is not in front of the camera, or with NaN for its depth. Bounds are not asked.
+  /// Pixel of a point in the camera frame. False, and `uv` stays, for a point outside of the
+  /// model's domain (of a pinhole: in front of the camera), or with NaN. Bounds are not asked.
   bool project(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const {
-    if (!can_see(p_c)) return false;
+    if (!flat_) return project_wide(p_c, uv);
+    if (!(p_c.z() > 0)) return false;
     uv = pinhole().project(p_c);
     return true;
   }
   /// The same with the derivative.
   bool project(const Eigen::Vector3d& p_c, Seen& seen) const;
-  /// The point is where the projection is defined.
-  bool can_see(const Eigen::Vector3d& p_c) const { return p_c.z() > 0; }
-  /// Direction in which pixel (u, v) looks, as the point at depth 1.
-  Eigen::Vector3d ray(double u, double v) const { return pinhole().unproject(u, v, 1.0); }
+  /// Direction in which pixel (u, v) looks: of a flat plane the point at depth 1, otherwise a unit
+  /// vector; NaN where a fisheye lens shows nothing.
+  Eigen::Vector3d ray(double u, double v) const {
+    return flat_ ? pinhole().unproject(u, v, 1.0) : wide_ray(u, v);
+  }
   /// The point at depth z [m] along the optical axis, seen at pixel (u, v).
   Eigen::Vector3d unproject(double u, double v, double z) const {
-    return pinhole().unproject(u, v, z);
+    if (flat_) return pinhole().unproject(u, v, z);
+    const Eigen::Vector3d r = wide_ray(u, v);
+    return r * (z / r.z());
+  }
+  /// Compares points with a keypoint at pixel (u, v) of the plane.
+  Sight sight(double u, double v) const;
+  /// Error of a point's projection against a keypoint, in raw pixels. False outside of the domain.
+  bool error(const Eigen::Vector3d& p_c, double u, double v, Eigen::Vector2d& error) const {
+    Eigen::Vector2d uv;
+    if (!project(p_c, uv)) return false;
+    error = raw_error(uv - Eigen::Vector2d(u, v), u, v);
+    return true;
+  }
+  /// In raw pixels a small difference of the plane against a keypoint at (u, v).
+  Eigen::Vector2d raw_error(const Eigen::Vector2d& difference, double u, double v) const {
+    return distorts_ ? Eigen::Vector2d(raw_by_plane(u, v) * difference) : difference;
+  }
+  /// Error of a point's (virtual) right column, given the error of its pixel.
+  double right_error(const Eigen::Vector3d& p_c, const Eigen::Vector2d& error, double u,
+                     double right_u) const {
+    return error.x() + (u - right_u) - options_.bf / p_c.z();
   }
   /// Pixels that the image moves in its middle per radian that the camera turns.
   double pixels_per_radian() const { return pinhole().fx; }
-  /// What undistorted pixels of the image can be.
+  /// What pixels of the plane can be.
   const ImageBounds& bounds() const { return bounds_; }
 
-  /// The lens bends: raw pixels and those of the plane differ.
-  bool distorts() const { return lens_.distorts(); }
-  /// Undistorted pixel of a raw one; the same one without a lens. A raw pixel at which the lens can
-  /// show nothing, because its model folds over there, stays as it is.
+  /// The plane is not the image: the lens bends what a pinhole would show.
+  bool distorts() const { return distorts_; }
+  /// Pixel of the plane of a raw one. A raw pixel at which the lens can show nothing, because its
+  /// model folds over there, stays as it is.
   Eigen::Vector2f from_image(const Eigen::Vector2f& raw) const;
-  /// Raw pixel of an undistorted one.
+  /// Some direction belongs to a raw pixel.
+  bool shows(const Eigen::Vector2d& raw) const;
+  /// Raw pixel of one of the plane; NaN where the lens shows nothing.
   Eigen::Vector2d to_image(const Eigen::Vector2d& uv) const;
 
   bool has_baseline() const { return options_.bf > 0; }
@@ -86,8 +126,14 @@ class Camera {
   double right_column(double u, double z) const { return u - options_.bf / z; }
 
  private:
+  bool project_wide(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const;
+  Eigen::Vector3d wide_ray(double u, double v) const;
+  /// How a raw pixel moves with one of the flat plane.
+  Eigen::Matrix2d raw_by_plane(double u, double v) const;
+
   CameraOptions options_;
-  Lens lens_;
+  LensModel lens_;
+  bool flat_, distorts_;
   ImageBounds bounds_;
   double close_depth_ = std::numeric_limits<double>::infinity();
 };

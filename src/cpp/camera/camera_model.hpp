@@ -29,6 +29,7 @@ class CameraModel {
   const CameraModelRow& row() const { return *row_; }
   const std::vector<double>& parameters() const { return parameters_; }
   ImageSize image_size() const { return image_size_; }
+  const LensModel& lens() const { return lens_; }
 
   /// Calls `function` with the lens, a type of LensModel. Call it once for a batch of points.
   template <class Function>

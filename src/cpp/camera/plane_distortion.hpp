@@ -9,7 +9,7 @@
 namespace orbslam {
 
 /// OpenCV's distortion of the plane at unit depth, with its domain: k1, k2, p1, p2, k3, k4, k5, k6
-/// as in Lens, and the thin prism s1, s2, s3, s4 (J. Weng, P. Cohen, M. Herniou, "Camera
+/// and the thin prism s1, s2, s3, s4 (J. Weng, P. Cohen, M. Herniou, "Camera
 /// calibration with distortion models and accuracy evaluation", 1992). The domain is the region
 /// around the axis in which the distortion is one-to-one.
 class PlaneDistortion {

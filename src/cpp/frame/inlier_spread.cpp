@@ -16,7 +16,7 @@ namespace {
 constexpr int kSpreadCells = kSpreadColumns * kSpreadRows;
 constexpr int kPoseParameters = 6;
 
-/// Derivative of a pixel (u, v, right u) by the pose's tangent: rotation, then translation.
+/// Derivative of a raw pixel (u, v, right u) by the pose's tangent: rotation, then translation.
 Eigen::Matrix<double, 3, kPoseParameters> by_pose(const Eigen::Matrix3d& by_point,
                                                   const Eigen::Vector3d& p) {
   Eigen::Matrix<double, 3, kPoseParameters> J;
@@ -37,18 +37,19 @@ struct Residuals {
   Residuals() { gradients.fill(Vector6d::Zero()); }
 
   void add(const TrackedFrame& tracked, std::size_t i, std::size_t cell, const Eigen::Vector3d& p,
-           const Seen& seen) {
+           const Sight& sight) {
     const Frame& frame = *tracked.frame;
     const Keypoint& keypoint = frame.keypoints[i];
+    const Eigen::Vector3d q = sight * p;
+    const Eigen::Vector2d error = q.head<2>() / q.z();
     Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
-    by_point.topRows<2>() = seen.J;
-    Eigen::Vector3d r(keypoint.x - seen.uv.x(), keypoint.y - seen.uv.y(), 0);
+    by_point.topRows<2>() = (sight.topRows<2>() - error * sight.row(2)) / q.z();
+    Eigen::Vector3d r(-error.x(), -error.y(), 0);
     const bool has_depth = frame.has_depth(i);
     if (has_depth) {
-      const double bf = frame.camera->bf();
-      by_point.row(2) = seen.J.row(0);
-      by_point(2, 2) += bf / (p.z() * p.z());
-      r.z() = frame.right_u[i] - frame.camera->right_column(seen.uv.x(), p.z());
+      by_point.row(2) = by_point.row(0);
+      by_point(2, 2) += frame.camera->bf() / (p.z() * p.z());
+      r.z() = -frame.camera->right_error(p, error, keypoint.x, frame.right_u[i]);
     }
     if (!r.allFinite()) return;
     const double weight = frame.scales->inverse_sigma2(keypoint.level);
@@ -101,11 +102,12 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
                                  std::clamp(column, 0, kSpreadColumns - 1));
     cells.set(cell);
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
-    Seen seen;
-    if (!camera.project(p, seen)) continue;
+    const Sight sight = camera.sight(keypoint.x, keypoint.y);
+    const double depth = sight.row(2).dot(p);
+    if (!(depth > 0)) continue;
     octaves.set(
-        static_cast<std::size_t>(std::clamp(std::ilogb(p.z()) + kOctaves / 2, 0, kOctaves - 1)));
-    residuals.add(tracked, i, cell, p, seen);
+        static_cast<std::size_t>(std::clamp(std::ilogb(depth) + kOctaves / 2, 0, kOctaves - 1)));
+    residuals.add(tracked, i, cell, p, sight);
   }
   const int n_cells = static_cast<int>(cells.count());
   return {n_cells, static_cast<int>(octaves.count()), residuals.covariance(n_cells)};

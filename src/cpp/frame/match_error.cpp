@@ -23,12 +23,11 @@ double median_match_error(const TrackedFrame& tracked) {
     if (!tracked.map_points[i].valid()) continue;
     const Keypoint& keypoint = frame.keypoints[i];
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
-    Eigen::Vector2d pixel;
-    if (!camera.project(p, pixel)) {
+    Eigen::Vector2d off;
+    if (!camera.error(p, keypoint.x, keypoint.y, off)) {
       squared.push_back(std::numeric_limits<double>::infinity());
       continue;
     }
-    const Eigen::Vector2d off = pixel - Eigen::Vector2d(keypoint.x, keypoint.y);
     const double weight = frame.scales->inverse_sigma2(keypoint.level);
     squared.push_back(weight * off.squaredNorm());
   }

@@ -117,10 +117,39 @@ struct Fit {
 /// The image plane of the small images.
 struct SmallPlane {
   Pinhole pinhole;
+  const Camera* fisheye = nullptr;  ///< a lens that no pinhole stands for
+  double shrink;
 
-  SmallPlane(const Pinhole& whole, int shrink)
-      : pinhole{whole.fx / shrink, whole.fy / shrink, (whole.cx - 0.5 * (shrink - 1)) / shrink,
-                (whole.cy - 0.5 * (shrink - 1)) / shrink} {}
+  SmallPlane(const Camera& camera, int shrink_by)
+      : fisheye(camera.is_flat() ? nullptr : &camera), shrink(shrink_by) {
+    const Pinhole& whole = camera.pinhole();
+    const double middle = 0.5 * (shrink - 1);
+    pinhole = {whole.fx / shrink, whole.fy / shrink, (whole.cx - middle) / shrink,
+               (whole.cy - middle) / shrink};
+  }
+
+  /// Rays of all pixels, row by row.
+  std::vector<Eigen::Vector3d> rays(int width, int height) const {
+    std::vector<Eigen::Vector3d> all;
+    all.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    const double middle = 0.5 * (shrink - 1);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        all.push_back(fisheye == nullptr ? pinhole.unproject(x, y, 1.0)
+                                         : fisheye->ray(x * shrink + middle, y * shrink + middle));
+      }
+    }
+    return all;
+  }
+
+  /// Pixel of a ray and its derivative; false where the lens shows nothing.
+  bool project(const Eigen::Vector3d& ray, Seen& seen) const {
+    if (fisheye == nullptr) return lens_models::PinholeLens{pinhole}.project(ray, seen);
+    if (!ray.allFinite() || !fisheye->project(ray, seen)) return false;
+    seen.uv = (seen.uv.array() - 0.5 * (shrink - 1)) / shrink;
+    seen.J /= shrink;
+    return true;
+  }
 
   Eigen::Matrix3d turned_by(const Eigen::Vector2i& shift) const {
     // What moves to the right and down in the image turns about +y and -x in the camera.
@@ -131,14 +160,15 @@ struct SmallPlane {
 };
 
 Fit linearise(const cv::Mat1f& first, const cv::Mat1f& second, const SmallPlane& plane,
-              const Eigen::Matrix3d& R_21, double gain, double offset) {
+              const std::vector<Eigen::Vector3d>& rays, const Eigen::Matrix3d& R_21, double gain,
+              double offset) {
   Fit fit;
-  const Pinhole& pinhole = plane.pinhole;
   for (int y = 1; y < first.rows - 1; ++y) {
     for (int x = 1; x < first.cols - 1; ++x) {
-      const Eigen::Vector3d ray = R_21 * pinhole.unproject(x, y, 1.0);
-      if (!(ray.z() > 0)) continue;
-      const Eigen::Vector2d at = pinhole.project(ray);
+      const Eigen::Vector3d ray = R_21 * rays[static_cast<std::size_t>(y * first.cols + x)];
+      Seen seen;
+      if (!plane.project(ray, seen)) continue;
+      const Eigen::Vector2d& at = seen.uv;
       if (!(at.x() >= 1 && at.y() >= 1 && at.x() < second.cols - 2 && at.y() < second.rows - 2)) {
         continue;
       }
@@ -158,10 +188,8 @@ Fit linearise(const cv::Mat1f& first, const cv::Mat1f& second, const SmallPlane&
                                 gain * static_cast<double>(first(y, x + 1) - first(y, x - 1)));
       const double gv = 0.25 * (sample(0, 1) - sample(0, -1) +
                                 gain * static_cast<double>(first(y + 1, x) - first(y - 1, x)));
-      const double iz = 1 / ray.z();
-      const Eigen::Vector3d by_point(
-          gu * pinhole.fx * iz, gv * pinhole.fy * iz,
-          -iz * iz * (gu * pinhole.fx * ray.x() + gv * pinhole.fy * ray.y()));
+      const Eigen::Vector3d by_point =
+          gu * seen.J.row(0).transpose() + gv * seen.J.row(1).transpose();
       Vector5d row;
       // A small turn w moves the ray by w x ray.
       row << ray.cross(by_point), -wanted, -1;
@@ -180,12 +208,13 @@ std::optional<ImageRotation> align_rotation(const SmallImage& first, const Small
   if (first.empty() || first.width != second.width || first.height != second.height) return {};
   const cv::Mat1f a = blurred(first), b = blurred(second);
   double correlation = -1;
-  const SmallPlane plane(camera.pinhole(), first.shrink);
+  const SmallPlane plane(camera, first.shrink);
+  const std::vector<Eigen::Vector3d> rays = plane.rays(a.cols, a.rows);
   Eigen::Matrix3d R_21 = plane.turned_by(best_shift(a, b, correlation));
   if (!(correlation > 0)) return {};
   double gain = 1, offset = 0;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const Fit fit = linearise(a, b, plane, R_21, gain, offset);
+    const Fit fit = linearise(a, b, plane, rays, R_21, gain, offset);
     if (fit.sums.n < kLeastOverlap * static_cast<double>(a.total())) return {};
     const Eigen::LDLT<Matrix5d> factor(fit.H);
     const Vector5d step = factor.solve(fit.b);
@@ -196,7 +225,7 @@ std::optional<ImageRotation> align_rotation(const SmallImage& first, const Small
     offset += step(4);
     if (turn.norm() < kSmallStep) break;
   }
-  const Fit fit = linearise(a, b, plane, R_21, gain, offset);
+  const Fit fit = linearise(a, b, plane, rays, R_21, gain, offset);
   correlation = fit.sums.value();
   if (fit.sums.n < kLeastOverlap * static_cast<double>(a.total()) || !(correlation > 0)) return {};
   return ImageRotation{Eigen::Quaterniond(R_21), correlation};

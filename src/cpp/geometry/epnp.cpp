@@ -70,12 +70,10 @@ std::optional<ControlFrame> control_frame(const Points& points) {
 /// M^T M of the projection equations in the camera coordinates of the control points.
 Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pixels& pixels,
                                             const Camera& camera) {
-  const Pinhole& k = camera.pinhole();
   Eigen::Matrix<double, 12, 12> normal = Eigen::Matrix<double, 12, 12>::Zero();
   for (Eigen::Index i = 0; i < pixels.cols(); ++i) {
-    Eigen::Matrix<double, 2, 3> ray;
-    ray << k.fx, 0, k.cx - pixels(0, i), 0, k.fy, k.cy - pixels(1, i);
-    const Eigen::Matrix3d product = ray.transpose() * ray;
+    const Eigen::Matrix<double, 2, 3> rows = camera.sight(pixels(0, i), pixels(1, i)).topRows<2>();
+    const Eigen::Matrix3d product = rows.transpose() * rows;
     for (int a = 0; a < 4; ++a) {
       for (int b = 0; b <= a; ++b) {
         // Only the lower triangle is read.
@@ -211,7 +209,10 @@ double mean_error(const Pose& T_cw, const Points& points, const Pixels& pixels,
   double sum = 0;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Vector3d p_c = R * points.col(i) + T_cw.translation();
-    sum += (camera.pinhole().project(p_c) - pixels.col(i)).norm();
+    const Eigen::Vector3d q = camera.sight(pixels(0, i), pixels(1, i)) * p_c;
+    // Of a fisheye lens what lies behind the ray has an image of its own.
+    if (!camera.is_flat() && !(q.z() > 0)) return std::numeric_limits<double>::infinity();
+    sum += q.head<2>().norm() / std::abs(q.z());
   }
   return sum / static_cast<double>(points.cols());
 }
@@ -239,7 +240,8 @@ std::optional<EpnpPose> solve_epnp(const Points& points, const Pixels& pixels,
     for (int k = 0; k < 4; ++k) control += b[k] * basis[static_cast<std::size_t>(k)];
     Eigen::Matrix3Xd camera_points = control * frame->weights;
     if (!camera_points.allFinite()) continue;
-    if (camera_points(2, 0) < 0) camera_points = -camera_points;
+    const Eigen::RowVector3d front = camera.sight(pixels(0, 0), pixels(1, 0)).row(2);
+    if (front * camera_points.col(0) < 0) camera_points = -camera_points;
     const Pose T_cw = absolute_orientation(points, camera_points);
     const double error = mean_error(T_cw, points, pixels, camera);
     if (!std::isfinite(error) || (best && !(error < best->mean_error))) continue;

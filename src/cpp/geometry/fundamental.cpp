@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/fundamental.hpp"
 
+#include <limits>
+#include <vector>
+
 #include "geometry/model_scoring.hpp"
 #include "geometry/small_solvers.hpp"
 
@@ -24,10 +27,36 @@ void line_errors(const Eigen::Matrix3d& F, const Eigen::ArrayXd& u, const Eigen:
   }
 }
 
+/// Squared distances [raw pixels] of the targets from the planes, or lines, F h.
+void line_errors(const Eigen::Matrix3d& F, const std::vector<HomogeneousPoint>& points,
+                 const std::vector<HomogeneousPoint>& targets, Eigen::ArrayXd& errors) {
+  errors.resize(static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d n = F * points[i].h;
+    const double residual = n.dot(targets[i].h);
+    errors[static_cast<Eigen::Index>(i)] =
+        residual * residual / (targets[i].by_pixel.transpose() * n).squaredNorm();
+  }
+}
+
 Eigen::Matrix3d nearest_of_rank_2(const Eigen::Matrix3d& matrix) {
   const Svd3 svd = svd_3(matrix);
   const Eigen::Vector3d& d = svd.values;
   return svd.U * Eigen::Vector3d(d[0], d[1], 0).asDiagonal() * svd.V.transpose();
+}
+
+/// Of unit rays, which need no normalisation.
+Eigen::Matrix3d fit_to_rays(const PointPairs& pairs, const EightPairs& sample) {
+  Eigen::Matrix<double, 9, 8> A;
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const auto i = static_cast<std::size_t>(sample[k]);
+    const Eigen::Vector3d &h_1 = pairs.points_1[i].h, &h_2 = pairs.points_2[i].h;
+    A.col(static_cast<Eigen::Index>(k)) << h_2.x() * h_1, h_2.y() * h_1, h_2.z() * h_1;
+  }
+  if (!A.allFinite()) return Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Matrix<double, 9, 1> f = orthogonal_to_columns(A);
+  return nearest_of_rank_2(
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(f.data()));
 }
 
 }  // namespace
@@ -35,6 +64,7 @@ Eigen::Matrix3d nearest_of_rank_2(const Eigen::Matrix3d& matrix) {
 Eigen::Matrix3d fit_fundamental(const PointPairs& pairs, const EightPairs& sample,
                                 const Normalization& normalization_1,
                                 const Normalization& normalization_2) {
+  if (!pairs.flat) return fit_to_rays(pairs, sample);
   using Column = Eigen::Matrix<double, 9, 1>;
   Eigen::Matrix<double, 9, 8> A;  // transposed: an equation per column
   for (std::size_t k = 0; k < sample.size(); ++k) {
@@ -58,6 +88,11 @@ ScoredModel best_fundamental(const PointPairs& pairs, const std::vector<EightPai
     return fit_fundamental(pairs, sample, normalization_1, normalization_2);
   };
   const auto measure = [&](const Eigen::Matrix3d& F_21, PairErrors& errors) {
+    if (!pairs.points_1.empty()) {
+      line_errors(F_21.transpose(), pairs.points_2, pairs.points_1, errors.in_1);
+      line_errors(F_21, pairs.points_1, pairs.points_2, errors.in_2);
+      return;
+    }
     line_errors(F_21.transpose(), pairs.u_2, pairs.v_2, pairs.u_1, pairs.v_1, errors.in_1);
     line_errors(F_21, pairs.u_1, pairs.v_1, pairs.u_2, pairs.v_2, errors.in_2);
   };

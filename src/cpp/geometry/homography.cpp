@@ -2,6 +2,8 @@
 #include "geometry/homography.hpp"
 
 #include <Eigen/LU>
+#include <limits>
+#include <vector>
 
 #include "geometry/model_scoring.hpp"
 #include "geometry/small_solvers.hpp"
@@ -24,11 +26,42 @@ void transfer_errors(const Eigen::Matrix3d& H, const Eigen::ArrayXd& u, const Ei
   }
 }
 
+/// Squared errors of H h against the targets.
+void transfer_errors(const Eigen::Matrix3d& H, const std::vector<HomogeneousPoint>& points,
+                     const std::vector<HomogeneousPoint>& targets, Eigen::ArrayXd& errors) {
+  errors.resize(static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d q = targets[i].B * (H * points[i].h);
+    errors[static_cast<Eigen::Index>(i)] = q.head<2>().squaredNorm() / (q.z() * q.z());
+  }
+}
+
+/// Of unit rays, which need no normalisation.
+Eigen::Matrix3d fit_to_rays(const PointPairs& pairs, const EightPairs& sample) {
+  Eigen::Matrix<double, 16, 9> A;
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const auto i = static_cast<std::size_t>(sample[k]);
+    const HomogeneousPoint& target = pairs.points_2[i];
+    const Eigen::RowVector3d h = pairs.points_1[i].h.transpose();
+    for (int row = 0; row < 2; ++row) {
+      const Eigen::RowVector3d b = target.B.row(row).normalized();
+      A.row(2 * static_cast<Eigen::Index>(k) + row) << b.x() * h, b.y() * h, b.z() * h;
+    }
+  }
+  const Eigen::Matrix<double, 9, 9> normal = A.transpose() * A;
+  if (!normal.allFinite()) {
+    return Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  const Eigen::Matrix<double, 9, 1> h = least_eigenvector<9>(normal);
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(h.data());
+}
+
 }  // namespace
 
 Eigen::Matrix3d fit_homography(const PointPairs& pairs, const EightPairs& sample,
                                const Normalization& normalization_1,
                                const Normalization& normalization_2) {
+  if (!pairs.flat) return fit_to_rays(pairs, sample);
   using Row = Eigen::Matrix<double, 1, 9>;
   Eigen::Matrix<double, 16, 9> A;
   for (std::size_t k = 0; k < sample.size(); ++k) {
@@ -53,6 +86,11 @@ ScoredModel best_homography(const PointPairs& pairs, const std::vector<EightPair
     return fit_homography(pairs, sample, normalization_1, normalization_2);
   };
   const auto measure = [&](const Eigen::Matrix3d& H_21, PairErrors& errors) {
+    if (!pairs.points_1.empty()) {
+      transfer_errors(H_21.inverse(), pairs.points_2, pairs.points_1, errors.in_1);
+      transfer_errors(H_21, pairs.points_1, pairs.points_2, errors.in_2);
+      return;
+    }
     transfer_errors(H_21.inverse(), pairs.u_2, pairs.v_2, pairs.u_1, pairs.v_1, errors.in_1);
     transfer_errors(H_21, pairs.u_1, pairs.v_1, pairs.u_2, pairs.v_2, errors.in_2);
   };

@@ -13,37 +13,33 @@ constexpr double min_parallax_cosine = 0.99998;
 constexpr double degrees_per_radian = 57.29577951308232;
 constexpr std::size_t parallax_rank = 50;
 
-/// Two cameras with the same intrinsics; camera 1 is the world.
+/// Two poses of one camera; the first is the world.
 struct CameraPair {
-  CameraPair(const Motion& motion, const Camera& camera)
-      : pinhole(camera.pinhole()), R(motion.R), t(motion.t) {
+  explicit CameraPair(const Motion& motion) : R(motion.R), t(motion.t) {
     P.leftCols<3>() = R;
     P.col(3) = t;
     center_2 = -R.transpose() * t;
   }
 
-  /// Linear triangulation of pixels, weighted by the focal lengths as if in pixel units.
-  Eigen::Vector3d triangulate(double u_1, double v_1, double u_2, double v_2) const {
-    const double fx = pinhole.fx, fy = pinhole.fy;
-    Eigen::Matrix4d A;
-    A.row(0) << -fx, 0, u_1 - pinhole.cx, 0;
-    A.row(1) << 0, -fy, v_1 - pinhole.cy, 0;
-    A.row(2) = (u_2 - pinhole.cx) * P.row(2) - fx * P.row(0);
-    A.row(3) = (v_2 - pinhole.cy) * P.row(2) - fy * P.row(1);
+  /// Linear triangulation of two keypoints, in units of their pixels.
+  Eigen::Vector3d triangulate(const Sight& sight_1, const Sight& sight_2) const {
+    Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
+    A.topLeftCorner<2, 3>() = sight_1.topRows<2>();
+    A.bottomRows<2>() = sight_2.topRows<2>() * P;
     const Eigen::Matrix4d normal = A.transpose() * A;
     const Eigen::Vector4d point = least_eigenvector<4>(normal);
     return point.head<3>() / point.w();
   }
 
-  double squared_error(const Eigen::Vector3d& p_c, double u, double v) const {
-    return (pinhole.project(p_c) - Eigen::Vector2d(u, v)).squaredNorm();
-  }
-
-  Pinhole pinhole;
   Eigen::Matrix3d R;
   Eigen::Vector3d t, center_2;
   Eigen::Matrix<double, 3, 4> P;  // of camera 2, normalised
 };
+
+/// Of a keypoint compared with a point, sight times point: pixels^2.
+double squared_error(const Eigen::Vector3d& compared) {
+  return compared.head<2>().squaredNorm() / (compared.z() * compared.z());
+}
 
 struct Judgement {
   bool good = false;
@@ -51,18 +47,18 @@ struct Judgement {
   double parallax_cosine = 0;
 };
 
-Judgement judge(const CameraPair& cameras, double u_1, double v_1, double u_2, double v_2,
+Judgement judge(const CameraPair& cameras, const Sight& sight_1, const Sight& sight_2,
                 double max_squared_error) {
   Judgement judgement;
-  const Eigen::Vector3d p_1 = cameras.triangulate(u_1, v_1, u_2, v_2);
+  const Eigen::Vector3d p_1 = cameras.triangulate(sight_1, sight_2);
   if (!p_1.allFinite()) return judgement;
   const Eigen::Vector3d ray_2 = p_1 - cameras.center_2;
   const double cosine = p_1.dot(ray_2) / (p_1.norm() * ray_2.norm());
   const bool far = !(cosine < min_parallax_cosine);
-  const Eigen::Vector3d p_2 = cameras.R * p_1 + cameras.t;
-  if ((p_1.z() <= 0 || p_2.z() <= 0) && !far) return judgement;
-  const bool fits = cameras.squared_error(p_1, u_1, v_1) <= max_squared_error &&
-                    cameras.squared_error(p_2, u_2, v_2) <= max_squared_error;
+  const Eigen::Vector3d in_1 = sight_1 * p_1, in_2 = sight_2 * (cameras.R * p_1 + cameras.t);
+  if ((in_1.z() <= 0 || in_2.z() <= 0) && !far) return judgement;
+  const bool fits =
+      squared_error(in_1) <= max_squared_error && squared_error(in_2) <= max_squared_error;
   if (!fits || !std::isfinite(cosine)) return judgement;
   judgement.good = true;
   judgement.point = p_1;
@@ -83,7 +79,7 @@ double parallax_of(std::vector<double>& cosines) {
 MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
                            const std::vector<std::uint8_t>& inliers, const Camera& camera,
                            double max_squared_error) {
-  const CameraPair cameras(motion, camera);
+  const CameraPair cameras(motion);
   MotionSupport support;
   support.points.assign(pairs.size(), Eigen::Vector3d::Zero());
   support.good.assign(pairs.size(), 0);
@@ -93,8 +89,8 @@ MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (!inliers[i]) continue;
     const auto k = static_cast<Eigen::Index>(i);
-    const Judgement judgement =
-        judge(cameras, pairs.u_1[k], pairs.v_1[k], pairs.u_2[k], pairs.v_2[k], max_squared_error);
+    const Judgement judgement = judge(cameras, camera.sight(pairs.u_1[k], pairs.v_1[k]),
+                                      camera.sight(pairs.u_2[k], pairs.v_2[k]), max_squared_error);
     if (!judgement.good) continue;
     support.points[i] = judgement.point;
     support.good[i] = 1;

@@ -44,10 +44,9 @@ PnpPose PnpRansac::judge(const Pose& T_cw) const {
   for (std::size_t i = 0; i < pose.inliers.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d p_c = R * problem_.points.col(k) + T_cw.translation();
-    Eigen::Vector2d pixel;
-    if (!problem_.camera->project(p_c, pixel)) continue;
-    const double error = (pixel - problem_.pixels.col(k)).squaredNorm();
-    if (!(error < max_chi2_ * problem_.sigma2[k])) continue;
+    Eigen::Vector2d error;
+    if (!problem_.camera->error(p_c, problem_.pixels(0, k), problem_.pixels(1, k), error)) continue;
+    if (!(error.squaredNorm() < max_chi2_ * problem_.sigma2[k])) continue;
     pose.inliers[i] = 1;
     ++pose.n_inliers;
   }

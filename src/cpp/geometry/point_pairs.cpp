@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/point_pairs.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -10,6 +11,16 @@ namespace {
 
 // Deviations far below a pixel's float32 resolution are rounding, not extent.
 constexpr double kLeastDeviation = 1e-6;
+
+HomogeneousPoint homogeneous(const Camera& camera, const Eigen::Matrix3d& inverse_K, double u,
+                             double v) {
+  HomogeneousPoint point;
+  point.B = camera.sight(u, v) * inverse_K;
+  point.h = camera.is_flat() ? Eigen::Vector3d(u, v, 1) : camera.ray(u, v);
+  const double scale = point.B.row(2).dot(point.h);
+  point.by_pixel = scale * point.B.inverse().leftCols<2>();
+  return point;
+}
 
 }  // namespace
 
@@ -47,6 +58,24 @@ PointPairs gather_pairs(const std::vector<Eigen::Vector2f>& initial,
     ++k;
   }
   return pairs;
+}
+
+Eigen::Matrix3d calibration_of(const Camera& camera) {
+  return camera.is_flat() ? camera.pinhole().matrix() : Eigen::Matrix3d::Identity();
+}
+
+void add_homogeneous_points(const Camera& camera, PointPairs& pairs) {
+  pairs.flat = camera.is_flat();
+  if (camera.is_pinhole()) return;
+  const Eigen::Matrix3d inverse_K = calibration_of(camera).inverse();
+  const auto fill = [&](const Eigen::ArrayXd& u, const Eigen::ArrayXd& v, auto& points) {
+    points.reserve(pairs.size());
+    for (Eigen::Index i = 0; i < u.size(); ++i) {
+      points.push_back(homogeneous(camera, inverse_K, u[i], v[i]));
+    }
+  };
+  fill(pairs.u_1, pairs.v_1, pairs.points_1);
+  fill(pairs.u_2, pairs.v_2, pairs.points_2);
 }
 
 Eigen::Matrix3d Normalization::matrix() const {

@@ -6,15 +6,35 @@
 #include <cstddef>
 #include <vector>
 
+#include "camera/camera.hpp"
+
 namespace orbslam {
 
-/// Matched pixels of two views, undistorted, one pair per index.
+/// A keypoint as homogeneous coordinates h of its image, and what compares others with it: the
+/// error of h' is ((B h')_0, (B h')_1) / (B h')_2 in raw pixels. Of a flat plane h is (u, v, 1), of
+/// a fisheye lens the unit ray.
+struct HomogeneousPoint {
+  Eigen::Vector3d h;
+  Eigen::Matrix3d B;
+  Eigen::Matrix<double, 3, 2> by_pixel;  ///< how h moves with the raw pixel
+};
+
+/// Matched pixels of two views, one pair per index.
 struct PointPairs {
   Eigen::ArrayXd u_1, v_1, u_2, v_2;
+  /// Of a camera that is no pinhole: the same points.
+  std::vector<HomogeneousPoint> points_1, points_2;
+  bool flat = true;  ///< h is (u, v, 1)
 
   std::size_t size() const { return static_cast<std::size_t>(u_1.size()); }
   void resize(std::size_t count);
 };
+
+/// What h has to be multiplied by to give directions: the calibration matrix of a flat plane, or 1.
+Eigen::Matrix3d calibration_of(const Camera& camera);
+
+/// Adds the homogeneous points of a camera that is no pinhole.
+void add_homogeneous_points(const Camera& camera, PointPairs& pairs);
 
 /// The pairs of all initial points i with matches[i] >= 0, ascending by i.
 /// Throws std::invalid_argument when a match is out of range or the lengths differ. See

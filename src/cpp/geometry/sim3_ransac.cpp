@@ -37,8 +37,8 @@ void project(const Eigen::Matrix3Xd& points, const Camera& camera, const Eigen::
 
 bool near_pixel(const Eigen::Vector3d& p_c, const Camera& camera, const Eigen::Vector2d& pixel,
                 double gate) {
-  Eigen::Vector2d uv;
-  return camera.project(p_c, uv) && (uv - pixel).squaredNorm() < gate;
+  Eigen::Vector2d error;
+  return camera.error(p_c, pixel.x(), pixel.y(), error) && error.squaredNorm() < gate;
 }
 
 }  // namespace

@@ -1,10 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/triangulation.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
 
 namespace orbslam {
+namespace {
+
+/// Two directions orthogonal to a ray. At z = 1 they are those of the image plane.
+Eigen::Matrix<double, 2, 3> orthogonal_to(const Eigen::Vector3d& ray) {
+  Eigen::Matrix<double, 2, 3> rows;
+  constexpr double kSteepest = 0.3;  // cosine to the axis from which on z is divided by
+  if (ray.z() == 1.0 || ray.z() > kSteepest * ray.norm()) {
+    rows << -1, 0, ray.x() / ray.z(), 0, -1, ray.y() / ray.z();
+    return rows;
+  }
+  const Eigen::Vector3d first = ray.unitOrthogonal();
+  rows << first.transpose(), ray.normalized().cross(first).transpose();
+  return rows;
+}
+
+}  // namespace
 
 std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& ray_1,
                                            const Eigen::Vector3d& ray_2, const Pose& T_1w,
@@ -12,10 +29,8 @@ std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& ray_1,
   const Eigen::Matrix<double, 3, 4> P_1 = T_1w.matrix().topRows<3>();
   const Eigen::Matrix<double, 3, 4> P_2 = T_2w.matrix().topRows<3>();
   Eigen::Matrix4d A;
-  A.row(0) = ray_1.x() * P_1.row(2) - P_1.row(0);
-  A.row(1) = ray_1.y() * P_1.row(2) - P_1.row(1);
-  A.row(2) = ray_2.x() * P_2.row(2) - P_2.row(0);
-  A.row(3) = ray_2.y() * P_2.row(2) - P_2.row(1);
+  A.topRows<2>() = orthogonal_to(ray_1) * P_1;
+  A.bottomRows<2>() = orthogonal_to(ray_2) * P_2;
   const Eigen::JacobiSVD<Eigen::Matrix4d> svd(A, Eigen::ComputeFullV);
   const Eigen::Vector4d point = svd.matrixV().col(3);
   if (point.w() == 0.0) return std::nullopt;

@@ -8,7 +8,7 @@
 
 namespace orbslam {
 
-/// Linear triangulation of two normalised rays (x, y, 1): the world point whose algebraic error in
+/// Linear triangulation of two rays (of any length but 0): the world point whose algebraic error in
 /// both cameras is least; nothing when it lies at infinity. See
 /// docs/method/mapping.md#new-points.
 std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& ray_1,

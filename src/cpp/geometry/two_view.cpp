@@ -140,7 +140,7 @@ std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
 /// Chooses among the motions of the chosen model and completes the result.
 void recover_motion(const Models& models, const PointPairs& pairs, const TwoViewInput& input,
                     const TwoViewOptions& options, WorkerThread* helper, TwoViewResult& result) {
-  const Eigen::Matrix3d K = input.camera.pinhole().matrix();
+  const Eigen::Matrix3d K = calibration_of(input.camera);
   const bool planar = result.model == TwoViewModel::homography;
   const ScoredModel& model = planar ? models.homography : models.fundamental;
   const std::vector<Motion> motions =
@@ -175,7 +175,8 @@ template <class Draw>
 TwoViewResult reconstruct(const TwoViewInput& input, const TwoViewOptions& options,
                           WorkerThread* helper, Draw draw) {
   check_options(options);
-  const PointPairs pairs = gather_pairs(input.initial, input.current, input.matches);
+  PointPairs pairs = gather_pairs(input.initial, input.current, input.matches);
+  add_homogeneous_points(input.camera, pairs);
   TwoViewResult result;
   result.n_matches = pairs.size();
   result.points.assign(input.matches.size(), Eigen::Vector3d::Zero());

@@ -24,7 +24,7 @@ struct TwoViewOptions {
 
 /// Two views and what is known about them. All must outlive the call.
 struct TwoViewInput {
-  const std::vector<Eigen::Vector2f>& initial;  ///< all keypoints of view 1, undistorted pixels
+  const std::vector<Eigen::Vector2f>& initial;  ///< all keypoints of view 1, pixels of the plane
   const std::vector<Eigen::Vector2f>& current;  ///< all keypoints of view 2
   const std::vector<int>& matches;              ///< per initial keypoint: index in current, or -1
   const Camera& camera;                         ///< of both views

@@ -8,9 +8,12 @@ namespace orbslam {
 
 std::optional<double> median_scene_depth(const Map& map, const KeyFrame& keyframe) {
   std::vector<double> depths;
+  const bool flat = keyframe.frame->camera->is_flat();
   for (const MapPointId id : keyframe.map_points) {
     if (const MapPoint* point = map.find(id)) {
-      depths.push_back((keyframe.T_cw * point->position).z());
+      const Eigen::Vector3d p_c = keyframe.T_cw * point->position;
+      // A fisheye lens also shows what is beside the camera and behind it.
+      depths.push_back(flat ? p_c.z() : p_c.norm());
     }
   }
   if (depths.empty()) return std::nullopt;

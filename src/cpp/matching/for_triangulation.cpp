@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "matching/for_triangulation.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <optional>
 
+#include "geometry/point_pairs.hpp"
 #include "geometry/triangulation.hpp"
 #include "map/scene_depth.hpp"
 #include "matching/by_projection.hpp"
@@ -41,36 +43,59 @@ std::optional<FreeFeatures> gather(const Map& map, KeyFrameId id) {
 // What the relative pose of two cameras says about a feature of 2 for a given feature of 1.
 class EpipolarGeometry {
  public:
-  EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b) : scales_(*b.frame->scales) {
-    const Camera &camera_a = *a.frame->camera, &camera_b = *b.frame->camera;
-    F_ = fundamental_matrix(a.T_cw, b.T_cw, camera_a.pinhole().matrix(),
-                            camera_b.pinhole().matrix());
+  EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b)
+      : scales_(*b.frame->scales), camera_1_(*a.frame->camera), camera_2_(*b.frame->camera) {
+    on_image_ = camera_1_.is_flat() && camera_2_.is_pinhole();
+    const Eigen::Matrix3d K_1 = calibration_of(camera_1_);
+    const Eigen::Matrix3d K_2 = on_image_ ? calibration_of(camera_2_) : Eigen::Matrix3d::Identity();
+    F_ = fundamental_matrix(a.T_cw, b.T_cw, K_1, K_2);
+    const Eigen::Vector3d center = b.T_cw * a.T_cw.center();
     Eigen::Vector2d epipole;
-    if (camera_b.project(b.T_cw * a.T_cw.center(), epipole)) epipole_ = epipole;
+    if (camera_2_.project(center, epipole)) epipoles_.push_back(epipole);
+    // A fisheye lens may show the line through both cameras at both its ends.
+    if (!camera_2_.is_flat() && camera_2_.project(-center, epipole)) epipoles_.push_back(epipole);
   }
 
   void select(const Keypoint& feature_1) {
-    line_ = F_.transpose() * Eigen::Vector3d(feature_1.x, feature_1.y, 1.0);
+    const Eigen::Vector3d h = camera_1_.is_flat() ? Eigen::Vector3d(feature_1.x, feature_1.y, 1.0)
+                                                  : camera_1_.ray(feature_1.x, feature_1.y);
+    line_ = F_.transpose() * h;
     squared_normal_ = line_.head<2>().squaredNorm();
   }
 
   // Near the epipole every feature lies on every line, and depth cannot be triangulated.
   bool near_epipole(const Keypoint& feature_2) const {
-    if (!epipole_) return false;
-    const double du = epipole_->x() - feature_2.x, dv = epipole_->y() - feature_2.y;
-    return du * du + dv * dv < kEpipoleExclusion * scales_.scale(feature_2.level);
+    for (const Eigen::Vector2d& epipole : epipoles_) {
+      const double du = epipole.x() - feature_2.x, dv = epipole.y() - feature_2.y;
+      if (du * du + dv * dv < kEpipoleExclusion * scales_.scale(feature_2.level)) return true;
+    }
+    return false;
   }
 
   bool on_line(const Keypoint& feature_2) const {
+    const double gate = kEpipolarGate * scales_.sigma2(feature_2.level);
+    if (!on_image_) return squared_distance(feature_2) < gate;
     if (!(squared_normal_ > 0)) return false;
     const double offset = line_.x() * feature_2.x + line_.y() * feature_2.y + line_.z();
-    return offset * offset / squared_normal_ < kEpipolarGate * scales_.sigma2(feature_2.level);
+    return offset * offset / squared_normal_ < gate;
   }
 
  private:
+  // Of a feature of 2 from the epipolar plane, whose normal in camera 2 is line_, in raw pixels.
+  double squared_distance(const Keypoint& feature_2) const {
+    const Eigen::Vector3d ray = camera_2_.ray(feature_2.x, feature_2.y);
+    const Sight B = camera_2_.sight(feature_2.x, feature_2.y);
+    const double scale = B.row(2).dot(ray);
+    const Eigen::Matrix<double, 3, 2> by_pixel = scale * B.inverse().leftCols<2>();
+    const double offset = line_.dot(ray);
+    return offset * offset / (by_pixel.transpose() * line_).squaredNorm();
+  }
+
   const ScalePyramid& scales_;
+  const Camera &camera_1_, &camera_2_;
+  bool on_image_;  // lines of image 2, otherwise planes
   Eigen::Matrix3d F_;
-  std::optional<Eigen::Vector2d> epipole_;  // image of camera 1, if it lies in front of camera 2
+  std::vector<Eigen::Vector2d> epipoles_;  // image of camera 1, if camera 2 can see it
   Eigen::Vector3d line_ = Eigen::Vector3d::Zero();
   double squared_normal_ = 0;
 };

@@ -32,11 +32,14 @@ struct Fusion {
 
 bool reprojection_agrees(const Frame& frame, std::size_t keypoint, const ImagePoint& image) {
   const Keypoint& feature = frame.keypoints[keypoint];
-  const double error_u = image.u - feature.x, error_v = image.v - feature.y;
-  double error = error_u * error_u + error_v * error_v;
+  const Eigen::Vector2d off =
+      frame.camera->raw_error({image.u - feature.x, image.v - feature.y}, feature.x, feature.y);
+  double error = off.squaredNorm();
   double gate = kFuseMonoGate;
   if (frame.has_depth(keypoint)) {
-    const double error_right = image.right_u - frame.right_u[keypoint];
+    // Disparities are not those of the lens.
+    const double error_right =
+        off.x() + (image.right_u - image.u) - (frame.right_u[keypoint] - feature.x);
     error += error_right * error_right;
     gate = kFuseStereoGate;
   }

@@ -32,16 +32,13 @@ double PairTriangulation::View::depth_parallax(std::size_t i, double none) const
 
 bool PairTriangulation::View::sees(const Eigen::Vector3d& point, std::size_t i) const {
   const Eigen::Vector3d p_c = T_cw * point;
-  Eigen::Vector2d uv;
-  if (!frame->camera->project(p_c, uv)) return false;
   const Keypoint& keypoint = frame->keypoints[i];
-  const double error_u = uv.x() - keypoint.x;
-  const double error_v = uv.y() - keypoint.y;
-  double error = error_u * error_u + error_v * error_v;
+  Eigen::Vector2d off;
+  if (!frame->camera->error(p_c, keypoint.x, keypoint.y, off)) return false;
+  double error = off.squaredNorm();
   double gate = kMonoGate;
   if (frame->has_depth(i)) {
-    const double error_right =
-        frame->camera->right_column(uv.x(), p_c.z()) - static_cast<double>(frame->right_u[i]);
+    const double error_right = frame->camera->right_error(p_c, off, keypoint.x, frame->right_u[i]);
     error += error_right * error_right;
     gate = kStereoGate;
   }

@@ -25,25 +25,38 @@ bool is_finite(const BundleProblem::Camera& camera) {
 
 }  // namespace
 
-void BlockBundle::Slots::resize(std::size_t n) {
+void BlockBundle::Slots::resize(std::size_t n, bool with_sights) {
   for (auto* values : {&u, &v, &right_u, &base, &weight_u, &weight_v, &weight_right}) {
     values->assign(n, 0.0);
   }
+  for (auto& values : sight) values.assign(with_sights ? n : 0, 0.0);
   view.assign(n, 0);
   point.assign(n, 0);
 }
 
 bundle_kernels::Observations BlockBundle::Slots::pointers() const {
-  return {u.data(),        v.data(),        right_u.data(),      base.data(),
-          weight_u.data(), weight_v.data(), weight_right.data(), view.data(),
-          point.data()};
+  bundle_kernels::Observations all{u.data(),
+                                   v.data(),
+                                   right_u.data(),
+                                   base.data(),
+                                   weight_u.data(),
+                                   weight_v.data(),
+                                   weight_right.data(),
+                                   view.data(),
+                                   point.data(),
+                                   {}};
+  if (sight[0].empty()) return all;
+  for (std::size_t k = 0; k < sight.size(); ++k) all.sight[k] = sight[k].data();
+  return all;
 }
 
 void BlockBundle::build(const BundleProblem& problem, const std::vector<std::uint8_t>& usable) {
   number_cameras(problem);
+  sights_ = std::any_of(problem.cameras.begin(), problem.cameras.end(),
+                        [](const auto& camera) { return !camera.model->is_pinhole(); });
   find_slots(problem);
   order_by_camera(problem);
-  fill(problem);
+  sights_ ? fill_sights(problem) : fill(problem);
   std::vector<std::uint8_t> off(usable.size());
   for (std::size_t i = 0; i < off.size(); ++i) off[i] = usable[i] != 0 ? 0 : 1;
   set_weights(problem, off);
@@ -113,8 +126,8 @@ void BlockBundle::find_slots(const BundleProblem& problem) {
     fixed = range.fixed_end;
   }
   batch_size_ = std::max<std::size_t>({bundle_kernels::kBatch, longest_, longest_fixed}) + kGap;
-  free_.resize(free + kGap);
-  fixed_.resize(fixed + kGap);
+  free_.resize(free + kGap, sights_);
+  fixed_.resize(fixed + kGap, sights_);
 }
 
 /// Free cameras of every point ascending: blocks below the diagonal are enough then.
@@ -162,6 +175,27 @@ void BlockBundle::fill(const BundleProblem& problem) {
   }
 }
 
+void BlockBundle::fill_sights(const BundleProblem& problem) {
+  for (std::size_t i = 0; i < slot_.size(); ++i) {
+    if (slot_[i] == kNone) continue;
+    const auto& o = problem.observations[i];
+    const Camera& camera = *problem.cameras[o.camera].model;
+    const std::uint32_t view = view_of_[o.camera];
+    Slots& slots = view < n_free() ? free_ : fixed_;
+    const std::uint32_t slot = slot_[i];
+    slots.view[slot] = view;
+    slots.point[slot] = o.point;
+    slots.right_u[slot] = o.has_depth ? o.u - o.right_u : 0.0;
+    slots.base[slot] = o.has_depth ? camera.bf() : 0.0;
+    // Where the lens shows nothing the observation is not usable, and 0 takes it out.
+    const Sight B = camera.sight(o.u, o.v);
+    for (std::size_t k = 0; k < slots.sight.size(); ++k) {
+      const double entry = B(static_cast<int>(k / 3), static_cast<int>(k % 3));
+      slots.sight[k][slot] = std::isfinite(entry) ? entry : 0.0;
+    }
+  }
+}
+
 void BlockBundle::set_weights(const BundleProblem& problem, const std::vector<std::uint8_t>& off) {
   for (std::size_t i = 0; i < slot_.size(); ++i) {
     if (slot_[i] == kNone) continue;
@@ -170,8 +204,8 @@ void BlockBundle::set_weights(const BundleProblem& problem, const std::vector<st
     Slots& slots = view_of_[o.camera] < n_free() ? free_ : fixed_;
     const double weight = off[i] != 0 ? 0.0 : static_cast<double>(o.inverse_sigma2);
     const std::uint32_t slot = slot_[i];
-    slots.weight_u[slot] = weight * (k.fx * k.fx);
-    slots.weight_v[slot] = weight * (k.fy * k.fy);
+    slots.weight_u[slot] = sights_ ? weight : weight * (k.fx * k.fx);
+    slots.weight_v[slot] = sights_ ? weight : weight * (k.fy * k.fy);
     slots.weight_right[slot] = o.has_depth ? slots.weight_u[slot] : 0.0;
   }
 }

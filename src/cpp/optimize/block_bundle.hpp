@@ -42,13 +42,15 @@ class BlockBundle {
   struct Slots {
     std::vector<double> u, v, right_u, base, weight_u, weight_v, weight_right;
     std::vector<std::uint32_t> view, point;
-    void resize(std::size_t n);
+    std::array<std::vector<double>, 9> sight;  ///< empty: all cameras are pinholes
+    void resize(std::size_t n, bool with_sights);
     bundle_kernels::Observations pointers() const;
   };
   void number_cameras(const BundleProblem& problem);
   void find_slots(const BundleProblem& problem);
   void order_by_camera(const BundleProblem& problem);
   void fill(const BundleProblem& problem);
+  void fill_sights(const BundleProblem& problem);
 
   std::vector<std::uint32_t> free_cameras_, cameras_;
   std::vector<std::uint32_t> view_of_;      ///< per camera
@@ -57,6 +59,7 @@ class BlockBundle {
   std::array<std::uint32_t, kTasks + 1> task_points_{};
   std::vector<std::uint32_t> slot_;         ///< per observation, in its list; kNone: takes no part
   std::vector<std::uint32_t> observation_;  ///< per slot of the free list
+  bool sights_ = false;                     ///< a camera is no pinhole
   std::size_t n_used_ = 0, batch_size_ = 0, longest_ = 0;
   Slots free_, fixed_;
 };

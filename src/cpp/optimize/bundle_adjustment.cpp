@@ -39,15 +39,15 @@ std::vector<double> judge(const BundleProblem& problem) {
     const BundleProblem::Camera& camera = problem.cameras[o.camera];
     const Eigen::Vector3d p =
         rotations[o.camera] * problem.points[o.point] + camera.T_cw.translation();
-    Eigen::Vector2d pixel;
-    if (!camera.model->project(p, pixel)) {
+    Eigen::Vector2d error;
+    if (!camera.model->error(p, o.u, o.v, error)) {
       chi2.push_back(std::numeric_limits<double>::infinity());
       continue;
     }
-    double squared = (Eigen::Vector2d(o.u, o.v) - pixel).squaredNorm();
+    double squared = error.squaredNorm();
     if (o.has_depth) {
-      const double error = o.right_u - (pixel.x() - camera.model->bf() / p.z());
-      squared += error * error;
+      const double right = camera.model->right_error(p, error, o.u, o.right_u);
+      squared += right * right;
     }
     const double whitened = static_cast<double>(o.inverse_sigma2) * squared;
     chi2.push_back(std::isfinite(whitened) ? whitened : std::numeric_limits<double>::infinity());

@@ -141,9 +141,11 @@ class CeresMinimiser final : public BundleMinimiser, public ceres::EvaluationCal
       m.has_depth = o.has_depth;
       m.huber = !options_.robust ? 0.0 : o.has_depth ? kHuberStereo : kHuberMono;
       m.u = o.u;
-      m.v = o.v;
       m.right_u = o.right_u;
-      m.scale = usable[i] != 0 ? deviation(o) : 0.0;
+      const Sight sight = bundle_.cameras[o.camera].model->sight(o.u, o.v);
+      const bool shown = sight.allFinite();
+      if (shown) m.sight = sight;
+      m.scale = shown && usable[i] != 0 ? deviation(o) : 0.0;
     }
   }
 

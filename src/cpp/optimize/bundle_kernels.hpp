@@ -29,8 +29,10 @@ inline constexpr int kScratchArrays = 27;
 /// Observations that are linearised before their points are eliminated.
 inline constexpr Index kBatch = 192;
 
-/// Observations on the normalised image plane: residuals in units of the focal length, which is in
-/// the weights. Weight 0 takes an observation out. Arrays are readable for kLanes more.
+/// Observations. Of pinholes they lie on the normalised image plane: residuals in units of the
+/// focal length, which is in the weights. With sights residuals are in pixels, u and v are not
+/// read, right_u is the disparity [px] and base is the baseline times the focal length [px m].
+/// Weight 0 takes an observation out. Arrays are readable for kLanes more.
 struct Observations {
   const double* u;
   const double* v;
@@ -41,6 +43,7 @@ struct Observations {
   const double* weight_right;  ///< 0 without depth
   const Index* view;
   const Index* point;
+  const double* sight[9];  ///< by rows; null: all cameras are pinholes
 };
 
 /// Where the observations of a point begin and end, by free and by fixed cameras.

@@ -19,8 +19,38 @@ struct Sight {
   Lanes x, y, right_x, inverse_z;  ///< on the normalised plane; right_x in the right camera's
   Lanes error_u, error_v, error_right;
   Lanes weight_u, weight_v, weight_right;  ///< with those of the kernel
+  // With sights x and y are pixels less those of the keypoint.
+  Lanes B[3][3], inverse_q, base;
 };
 
+/// From the points in the camera frame, for any camera: see Sight in camera/camera.hpp.
+inline void compare(const Observations& o, Size i, const Lanes (&p)[3], Sight& s) {
+  Lanes q[3];
+  for (int row = 0; row < 3; ++row) {
+    for (int k = 0; k < 3; ++k) s.B[row][k] = load(o.sight[3 * row + k] + i);
+    q[row] = s.B[row][0] * p[0] + (s.B[row][1] * p[1] + s.B[row][2] * p[2]);
+  }
+  const Lanes tiny2 = all(kTinyDepth * kTinyDepth);
+  const Lanes weight_u = load(o.weight_u + i), weight_right = load(o.weight_right + i);
+  Mask deep = weight_right <= all(0);
+  deep |= p[2] * p[2] > tiny2;
+  const Mask on = (weight_u > all(0)) & (q[2] * q[2] > tiny2) & deep;
+  s.p = {keep(on, p[0]), keep(on, p[1]), keep(on, p[2])};
+  s.weight_u = keep(on, weight_u);
+  s.weight_v = keep(on, load(o.weight_v + i));
+  s.weight_right = keep(on, weight_right);
+  s.inverse_q = keep(on, all(1) / q[2]);
+  s.inverse_z = keep(s.weight_right > all(0), all(1) / p[2]);
+  s.x = keep(on, q[0]) * s.inverse_q;
+  s.y = keep(on, q[1]) * s.inverse_q;
+  s.base = load(o.base + i);
+  s.right_x = s.x - s.base * s.inverse_z;
+  s.error_u = -s.x;
+  s.error_v = -s.y;
+  s.error_right = keep(s.weight_right > all(0), -load(o.right_u + i) - s.right_x);
+}
+
+template <bool kSights>
 inline void project(const Observations& o, Size i, const Task& task, Sight& s) {
   Lanes X[4];
   for (int k = 0; k < 4; ++k) X[k] = load(task.points + Size{kPointSize} * o.point[i + k]);
@@ -35,6 +65,7 @@ inline void project(const Observations& o, Size i, const Task& task, Sight& s) {
     p[row] = (r[0] * X[0] + r[1] * X[1]) + (r[2] * X[2] + r[3]);
     for (int k = 0; k < 3; ++k) s.R[row][k] = r[k];
   }
+  if constexpr (kSights) return compare(o, i, p, s);
   const Lanes weight_u = load(o.weight_u + i);
   const Mask on = (weight_u > all(0)) & (p[2] * p[2] > all(kTinyDepth * kTinyDepth));
   s.p = {keep(on, p[0]), keep(on, p[1]), keep(on, p[2])};
@@ -68,18 +99,51 @@ inline Lanes weigh(const Task& task, Sight& s) {
   return choose(inside, q, width * (all(2) * distance - width));
 }
 
-/// J^T W J (entry 01 is 0) and J^T W e of the projection by the point in the camera frame.
+/// J^T W J and J^T W e of the projection by the point in the camera frame. Entry 01 is 0 of a
+/// pinhole.
 struct Normal {
-  Lanes m00, m02, m11, m12, m22;
+  Lanes m00, m01, m02, m11, m12, m22;
   Vector3 b;
 };
 
+/// Adds a row (a, b, c) of the derivative.
+inline void add_row(Normal& n, const Lanes (&row)[3], Lanes weight, Lanes error) {
+  const Lanes a = weight * row[0], b = weight * row[1], c = weight * row[2];
+  n.m00 += a * row[0];
+  n.m01 += a * row[1];
+  n.m02 += a * row[2];
+  n.m11 += b * row[1];
+  n.m12 += b * row[2];
+  n.m22 += c * row[2];
+  n.b.x += a * error;
+  n.b.y += b * error;
+  n.b.z += c * error;
+}
+
+inline Normal normal_equations_of_sights(const Sight& s) {
+  const Lanes zero = all(0);
+  Normal n{zero, zero, zero, zero, zero, zero, {zero, zero, zero}};
+  Lanes row_u[3], row_v[3];
+  for (int k = 0; k < 3; ++k) {
+    row_u[k] = (s.B[0][k] - s.x * s.B[2][k]) * s.inverse_q;
+    row_v[k] = (s.B[1][k] - s.y * s.B[2][k]) * s.inverse_q;
+  }
+  add_row(n, row_u, s.weight_u, s.error_u);
+  add_row(n, row_v, s.weight_v, s.error_v);
+  row_u[2] += s.base * s.inverse_z * s.inverse_z;
+  add_row(n, row_u, s.weight_right, s.error_right);
+  return n;
+}
+
+template <bool kSights>
 inline Normal normal_equations(const Sight& s) {
+  if constexpr (kSights) return normal_equations_of_sights(s);
   const Lanes u = s.weight_u * s.inverse_z, v = s.weight_v * s.inverse_z;
   const Lanes right = s.weight_right * s.inverse_z;
   const Lanes ux = u * s.x, vy = v * s.y, rx = right * s.right_x;
   Normal n;
   n.m00 = (u + right) * s.inverse_z;
+  n.m01 = all(0);
   n.m02 = -(ux + rx) * s.inverse_z;
   n.m11 = v * s.inverse_z;
   n.m12 = -vy * s.inverse_z;
@@ -106,15 +170,15 @@ inline void add_to_cameras(Lanes (&values)[28], const Index* view, Size count, d
 /// A^T M A and A^T b with A = (-[p]x, I), the derivative of the point by the camera's step.
 inline void camera_equations(const Vector3& p, const Normal& n, Lanes (&out)[28]) {
   const Lanes zero = all(0);
-  const Vector3 k0 = cross(p, {n.m00, zero, n.m02});  // columns of [p]x M
-  const Vector3 k1 = cross(p, {zero, n.m11, n.m12});
+  const Vector3 k0 = cross(p, {n.m00, n.m01, n.m02});  // columns of [p]x M
+  const Vector3 k1 = cross(p, {n.m01, n.m11, n.m12});
   const Vector3 k2 = cross(p, {n.m02, n.m12, n.m22});
   const Vector3 t0 = cross(p, {k0.x, k1.x, k2.x});  // rows of [p]x M [p]x^T
   const Vector3 t1 = cross(p, {k0.y, k1.y, k2.y});
   const Vector3 t2 = cross(p, {k0.z, k1.z, k2.z});
   const Vector3 torque = cross(p, n.b);
   const Lanes values[28] = {t0.x,     t1.x,     t1.y,     t2.x,  t2.y,  t2.z,  k0.x,
-                            k0.y,     k0.z,     n.m00,    k1.x,  k1.y,  k1.z,  zero,
+                            k0.y,     k0.z,     n.m00,    k1.x,  k1.y,  k1.z,  n.m01,
                             n.m11,    k2.x,     k2.y,     k2.z,  n.m02, n.m12, n.m22,
                             torque.x, torque.y, torque.z, n.b.x, n.b.y, n.b.z, zero};
   for (int k = 0; k < 28; ++k) out[k] = values[k];
@@ -134,18 +198,22 @@ struct Batch {
 constexpr int kPointNormal = 0, kPointRight = 6, kCoupling = 9;
 constexpr int kFixedArrays = 18;  ///< where those of fixed cameras begin: the first nine
 
-template <bool kFree, bool kRobust>
+template <bool kFree, bool kRobust, bool kSights>
 void linearise(const Task& task, Size end, const Batch& batch) {
   const Observations& o = kFree ? task.free : task.fixed;
   for (Size i = batch.begin; i < end; i += kLanes) {
     Sight s;
-    project(o, i, task, s);
+    project<kSights>(o, i, task, s);
     weigh<kRobust>(task, s);
-    const Normal n = normal_equations(s);
+    const Normal n = normal_equations<kSights>(s);
     Lanes MR[3][3];
     for (int c = 0; c < 3; ++c) {
       MR[0][c] = n.m00 * s.R[0][c] + n.m02 * s.R[2][c];
       MR[1][c] = n.m11 * s.R[1][c] + n.m12 * s.R[2][c];
+      if constexpr (kSights) {
+        MR[0][c] += n.m01 * s.R[1][c];
+        MR[1][c] += n.m01 * s.R[0][c];
+      }
       MR[2][c] = n.m02 * s.R[0][c] + (n.m12 * s.R[1][c] + n.m22 * s.R[2][c]);
     }
     int k = kPointNormal;
@@ -286,7 +354,7 @@ inline Index batch_end(const Task& task, Index begin) {
   return end;
 }
 
-template <bool kRobust>
+template <bool kRobust, bool kSights>
 double sweep(const Task& task, bool only_measure) {
   double largest = 0;
   double* records = task.scratch + kScratchArrays * task.scratch_stride;
@@ -295,8 +363,8 @@ double sweep(const Task& task, bool only_measure) {
     const Batch free{task.scratch, task.scratch_stride, task.ranges[begin].free_begin};
     const Batch fixed{task.scratch + kFixedArrays * task.scratch_stride, task.scratch_stride,
                       task.ranges[begin].fixed_begin};
-    linearise<true, kRobust>(task, task.ranges[end - 1].free_end, free);
-    linearise<false, kRobust>(task, task.ranges[end - 1].fixed_end, fixed);
+    linearise<true, kRobust, kSights>(task, task.ranges[end - 1].free_end, free);
+    linearise<false, kRobust, kSights>(task, task.ranges[end - 1].fixed_end, fixed);
     for (; begin < end; ++begin) {
       const PointRange& range = task.ranges[begin];
       double sums[9] = {};
@@ -315,37 +383,47 @@ double sweep(const Task& task, bool only_measure) {
   return largest;
 }
 
-template <bool kRobust>
+template <bool kRobust, bool kSights>
 Lanes cost_of(const Task& task, const Observations& o, Size begin, Size end) {
   Lanes cost = all(0);
   for (Size i = begin; i < end; i += kLanes) {
     Sight s;
-    project(o, i, task, s);
+    project<kSights>(o, i, task, s);
     cost += weigh<kRobust>(task, s);
   }
   return cost;
 }
 
-template <bool kRobust>
+template <bool kRobust, bool kSights>
 double total_cost(const Task& task) {
   if (task.point_begin == task.point_end) return 0;
   const PointRange& first = task.ranges[task.point_begin];
   const PointRange& last = task.ranges[task.point_end - 1];
-  return sum(cost_of<kRobust>(task, task.free, first.free_begin, last.free_end)) +
-         sum(cost_of<kRobust>(task, task.fixed, first.fixed_begin, last.fixed_end));
+  return sum(cost_of<kRobust, kSights>(task, task.free, first.free_begin, last.free_end)) +
+         sum(cost_of<kRobust, kSights>(task, task.fixed, first.fixed_begin, last.fixed_end));
 }
+
+bool has_sights(const Task& task) { return task.free.sight[0] != nullptr; }
 
 double cost(const Task& task) {
-  return task.huber_mono > 0 ? total_cost<true>(task) : total_cost<false>(task);
+  if (has_sights(task)) {
+    return task.huber_mono > 0 ? total_cost<true, true>(task) : total_cost<false, true>(task);
+  }
+  return task.huber_mono > 0 ? total_cost<true, false>(task) : total_cost<false, false>(task);
 }
 
-double curvature(const Task& task) {
-  return task.huber_mono > 0 ? sweep<true>(task, true) : sweep<false>(task, true);
+double swept(const Task& task, bool only_measure) {
+  if (has_sights(task)) {
+    return task.huber_mono > 0 ? sweep<true, true>(task, only_measure)
+                               : sweep<false, true>(task, only_measure);
+  }
+  return task.huber_mono > 0 ? sweep<true, false>(task, only_measure)
+                             : sweep<false, false>(task, only_measure);
 }
 
-void eliminate(const Task& task) {
-  task.huber_mono > 0 ? sweep<true>(task, false) : sweep<false>(task, false);
-}
+double curvature(const Task& task) { return swept(task, true); }
+
+void eliminate(const Task& task) { swept(task, false); }
 
 /// Per observation the coupling times how its camera moves the point in its frame.
 inline void couple(const Task& task, Size end, const Batch& batch) {

@@ -16,17 +16,19 @@ struct CameraRow {
   double a, b, c;
 };
 
-CameraRow row_u(const BundleMeasurement& m) {
-  const double a = m.factor * m.view->camera().pinhole().fx * m.inverse_z;
-  return {a, 0, -a * m.p_c[0] * m.inverse_z};
+/// Of the prediction of the raw pixel: (B.row(row) p) / (B.row(2) p).
+CameraRow pixel_row(const BundleMeasurement& m, int row) {
+  const double scale = m.factor * m.inverse_q;
+  const double at = m.predicted[row];
+  const auto entry = [&](int k) { return scale * (m.sight(row, k) - at * m.sight(2, k)); };
+  return {entry(0), entry(1), entry(2)};
 }
-CameraRow row_v(const BundleMeasurement& m) {
-  const double b = m.factor * m.view->camera().pinhole().fy * m.inverse_z;
-  return {0, b, -b * m.p_c[1] * m.inverse_z};
-}
+CameraRow row_u(const BundleMeasurement& m) { return pixel_row(m, 0); }
+CameraRow row_v(const BundleMeasurement& m) { return pixel_row(m, 1); }
 CameraRow row_right(const BundleMeasurement& m) {
-  const CameraRow row = row_u(m);
-  return {row.a, 0, row.c + m.factor * m.view->camera().bf() * m.inverse_z * m.inverse_z};
+  CameraRow row = row_u(m);
+  row.c += m.factor * m.view->camera().bf() / (m.p_c[2] * m.p_c[2]);
+  return row;
 }
 
 /// Derivative of the residual (minus the prediction) with respect to the six camera parameters.
@@ -94,25 +96,31 @@ double BundleMeasurement::evaluate() {
   for (int i = 0; i < 3; ++i) {
     p_c[i] = R(i, 0) * point[0] + R(i, 1) * point[1] + R(i, 2) * point[2] + t(i);
   }
-  if (!(scale > 0 && std::abs(p_c[2]) > kTinyDepth)) {  // also when the point is NaN
+  const double q = sight(2, 0) * p_c[0] + sight(2, 1) * p_c[1] + sight(2, 2) * p_c[2];
+  const bool usable =
+      scale > 0 && std::abs(q) > kTinyDepth && !(has_depth && !(std::abs(p_c[2]) > kTinyDepth));
+  if (!usable) {  // also when the point is NaN
     std::fill_n(p_c, 3, 0.0);
+    p_c[2] = 1;
     std::fill_n(residual, 3, 0.0);
-    inverse_z = factor = 0;
+    std::fill_n(predicted, 2, 0.0);
+    inverse_q = factor = 0;
     return 0;
   }
-  inverse_z = 1 / p_c[2];
+  inverse_q = 1 / q;
   factor = scale;
-  const Pinhole& k = view->camera().pinhole();
-  const double predicted_u = k.fx * p_c[0] * inverse_z + k.cx;
-  residual[0] = factor * (u - predicted_u);
-  residual[1] = factor * (v - (k.fy * p_c[1] * inverse_z + k.cy));
+  for (int row = 0; row < 2; ++row) {
+    predicted[row] =
+        (sight(row, 0) * p_c[0] + sight(row, 1) * p_c[1] + sight(row, 2) * p_c[2]) * inverse_q;
+    residual[row] = -factor * predicted[row];
+  }
   residual[2] =
-      has_depth ? factor * (right_u - (predicted_u - view->camera().bf() * inverse_z)) : 0.0;
+      has_depth ? factor * (-predicted[0] - (u - right_u) + view->camera().bf() / p_c[2]) : 0.0;
   if (huber == 0) return 0;
-  const double q =
+  const double square =
       residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];
-  if (q <= huber * huber) return 0;
-  const double root = std::sqrt(q);
+  if (square <= huber * huber) return 0;
+  const double root = std::sqrt(square);
   const double weight = std::sqrt(huber / root);
   factor *= weight;
   for (double& r : residual) r *= weight;

@@ -47,18 +47,20 @@ struct BundleMeasurement {
   const double* point = nullptr;  ///< world
   /// Of the point by its parameters; nullptr: they are its coordinates.
   const Eigen::Matrix3d* chart = nullptr;
-  double u = 0, v = 0, right_u = 0;
+  double u = 0, right_u = 0;        ///< read with depth alone
+  Sight sight = Sight::Identity();  ///< of the keypoint
   double scale = 1;  ///< one over the standard deviation; 0 takes the observation out
   double huber = 0;  ///< width of the kernel; 0: none
   bool has_depth = false;
 
   double p_c[3] = {};  ///< the point in the camera frame
-  double inverse_z = 0;
-  double factor = 0;        ///< scale times sqrt(rho'), of residuals and derivatives
-  double residual[3] = {};  ///< u, v, right u: measurement minus prediction, times factor
+  double inverse_q = 0;
+  double predicted[2] = {};  ///< raw pixel of the point, less that of the keypoint
+  double factor = 0;         ///< scale times sqrt(rho'), of residuals and derivatives
+  double residual[3] = {};   ///< u, v, right u: measurement minus prediction, times factor
 
   /// Returns rho(q) - rho'(q) q: what the squared residuals lack of the robustified cost.
-  /// Points on the camera's plane have zero residuals.
+  /// Points that the sight cannot compare have zero residuals.
   double evaluate();
   /// Adds this observation's part of the diagonal of the Gauss-Newton matrix.
   void add_curvature(Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal) const;

@@ -21,6 +21,8 @@ pose_sums::Task task_of(const Group& group, const Camera& camera, const Pose& T_
                        group.v.data(),
                        group.right_u.data(),
                        group.weight.data(),
+                       !camera.is_pinhole(),
+                       {},
                        {},
                        {},
                        k.fx,
@@ -28,7 +30,11 @@ pose_sums::Task task_of(const Group& group, const Camera& camera, const Pose& T_
                        k.cx,
                        k.cy,
                        camera.bf() / k.fx,
+                       camera.bf(),
                        huber};
+  for (std::size_t entry = 0; entry < group.sight.size(); ++entry) {
+    task.sight[entry] = group.sight[entry].data();
+  }
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = T_cw.rotation_matrix();
   std::copy_n(R.data(), 9, std::begin(task.rotation));
   std::copy_n(T_cw.translation().data(), 3, std::begin(task.translation));
@@ -62,6 +68,7 @@ const pose_sums::Kernels& kernels() {
 
 void Group::clear() {
   for (auto* values : {&x, &y, &z, &u, &v, &right_u, &inverse_sigma2, &weight}) values->clear();
+  for (auto& values : sight) values.clear();
   slot.clear();
 }
 
@@ -83,7 +90,16 @@ void Group::pad() {
     for (auto* values : {&x, &y, &z, &u, &v, &right_u, &inverse_sigma2}) {
       values->push_back(values->back());
     }
+    for (auto& values : sight) {
+      if (!values.empty()) values.push_back(values.back());
+    }
     weight.push_back(0);
+  }
+}
+
+void Group::push_back(const Sight& B) {
+  for (std::size_t k = 0; k < sight.size(); ++k) {
+    sight[k].push_back(B(static_cast<int>(k / 3), static_cast<int>(k % 3)));
   }
 }
 
@@ -100,12 +116,14 @@ double accumulate_stereo(const Group& group, const Camera& camera, const Pose& T
 double chi2(const Group& group, std::size_t i, bool stereo, const Camera& camera,
             const Eigen::Matrix3d& R_cw, const Eigen::Vector3d& t_cw) {
   const Eigen::Vector3d p = R_cw * Eigen::Vector3d(group.x[i], group.y[i], group.z[i]) + t_cw;
-  if (!(p.z() > kTinyDepth)) return std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d pixel = camera.pinhole().project(p);
-  const double error_u = group.u[i] - pixel.x(), error_v = group.v[i] - pixel.y();
-  double squared = error_u * error_u + error_v * error_v;
+  if (camera.is_flat() && !(p.z() > kTinyDepth)) return std::numeric_limits<double>::infinity();
+  Eigen::Vector2d error;
+  if (!camera.error(p, group.u[i], group.v[i], error)) {
+    return std::numeric_limits<double>::infinity();
+  }
+  double squared = error.squaredNorm();
   if (stereo) {
-    const double error_r = group.right_u[i] - (pixel.x() - camera.bf() / p.z());
+    const double error_r = camera.right_error(p, error, group.u[i], group.right_u[i]);
     squared += error_r * error_r;
   }
   return group.inverse_sigma2[i] * squared;

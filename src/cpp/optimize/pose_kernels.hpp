@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "base/pose.hpp"
@@ -19,8 +20,9 @@ struct Group {
   std::vector<double> x, y, z;        ///< world
   std::vector<double> u, v, right_u;  ///< pixels; right_u only in the group with depth
   std::vector<double> inverse_sigma2;
-  std::vector<double> weight;     ///< inverse_sigma2 of those in use, 0 of the others
-  std::vector<std::size_t> slot;  ///< position in the caller's list
+  std::vector<double> weight;                ///< inverse_sigma2 of those in use, 0 of the others
+  std::array<std::vector<double>, 9> sight;  ///< by rows; empty for a pinhole
+  std::vector<std::size_t> slot;             ///< position in the caller's list
 
   std::size_t size() const { return slot.size(); }
   void clear();
@@ -28,6 +30,8 @@ struct Group {
                  double inverse_variance, std::size_t caller_slot);
   /// Appends observations of weight 0 up to the next multiple of kLanes.
   void pad();
+  /// The sight of the observation that was added last, of a camera that is no pinhole.
+  void push_back(const Sight& B);
 };
 
 /// Normal equations H x = b of the weighted least squares problem in the left tangent of T_cw.

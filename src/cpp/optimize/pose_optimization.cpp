@@ -40,13 +40,19 @@ struct Workspace {
     used_stereo = stereo.weight;
     return !same;
   }
-  /// False, and nothing added, for a broken number: it must not reach the sums.
-  bool add(const Eigen::Vector3d& position, double u, double v, double right_u,
-           double inverse_sigma2, bool has_depth, std::size_t slot) {
+  /// False, and nothing added, for a broken number, or a pixel at which the lens shows nothing: it
+  /// must not reach the sums.
+  bool add(const Camera& camera, const Eigen::Vector3d& position, double u, double v,
+           double right_u, double inverse_sigma2, bool has_depth, std::size_t slot) {
     if (!position.allFinite() || !std::isfinite(u + v + inverse_sigma2)) return false;
     if (has_depth && !std::isfinite(right_u)) return false;
-    (has_depth ? stereo : mono)
-        .push_back(position, u, v, has_depth ? right_u : 0.0, inverse_sigma2, slot);
+    Group& group = has_depth ? stereo : mono;
+    if (!camera.is_pinhole()) {
+      const Sight sight = camera.sight(u, v);
+      if (!sight.allFinite()) return false;
+      group.push_back(sight);
+    }
+    group.push_back(position, u, v, has_depth ? right_u : 0.0, inverse_sigma2, slot);
     return true;
   }
   int size() const { return static_cast<int>(mono.size() + stereo.size()); }
@@ -152,11 +158,13 @@ int classify(Group& group, bool stereo, const Camera& camera, const Pose& T_cw,
 
 /// Leaves out what lies behind the camera at a round's start: its mirror image would pull the pose,
 /// and no small step brings it to the front.
-void leave_out_hidden(Group& group, const Pose& T_cw) {
-  const Eigen::RowVector3d axis = T_cw.rotation_matrix().row(2);
+void leave_out_hidden(Group& group, const Camera& camera, const Pose& T_cw) {
+  const Eigen::Matrix3d R = T_cw.rotation_matrix();
   for (std::size_t i = 0; i < group.size(); ++i) {
-    const double depth =
-        axis.dot(Eigen::RowVector3d(group.x[i], group.y[i], group.z[i])) + T_cw.translation().z();
+    const Eigen::Vector3d point(group.x[i], group.y[i], group.z[i]);
+    Eigen::RowVector3d axis(0, 0, 1);
+    if (!camera.is_flat()) axis << group.sight[6][i], group.sight[7][i], group.sight[8][i];
+    const double depth = (axis * R).dot(point) + axis.dot(T_cw.translation());
     if (!(depth > pose_kernels::kTinyDepth)) group.weight[i] = 0;
   }
 }
@@ -195,8 +203,8 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
   w.stereo.pad();
   for (int round = 0; round < kRounds; ++round) {
     Pose T_cw = T_cw_initial;
-    leave_out_hidden(w.mono, T_cw);
-    leave_out_hidden(w.stereo, T_cw);
+    leave_out_hidden(w.mono, camera, T_cw);
+    leave_out_hidden(w.stereo, camera, T_cw);
     // The same problem from the same pose ends as before.
     if (!w.note_weights() && round != kPlainRound) continue;
     estimate.iterations += minimise(w, camera, round != kPlainRound, T_cw);
@@ -212,7 +220,7 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
 bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
   const Frame& f = *frame.frame;
   const Keypoint& keypoint = f.keypoints[i];
-  return w.add(frame.positions[i], keypoint.x, keypoint.y, f.right_u[i],
+  return w.add(*f.camera, frame.positions[i], keypoint.x, keypoint.y, f.right_u[i],
                f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), i);
 }
 
@@ -226,7 +234,8 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
   estimate.outlier.resize(observations.size());
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const PoseObservation& o = observations[i];
-    const bool usable = w.add(o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
+    const bool usable =
+        w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
     estimate.outlier[i] = usable ? 0 : 1;
   }
   run_rounds(w, camera, T_cw_initial, estimate, estimate.outlier.data());

@@ -26,10 +26,13 @@ struct Task {
   const double* v;
   const double* right_u;  ///< pixels; read in the group with depth alone
   const double* weight;
-  double rotation[9];  ///< R_cw by rows
+  bool has_sights;         ///< false: the camera is a pinhole, and u and v say the same
+  const double* sight[9];  ///< by rows
+  double rotation[9];      ///< R_cw by rows
   double translation[3];
   double fx, fy, cx, cy;
   double base;   ///< baseline [m]
+  double bf;     ///< baseline times fx [pixel metre]
   double huber;  ///< width on whitened residuals; 0: plain least squares
 };
 

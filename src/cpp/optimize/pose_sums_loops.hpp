@@ -58,7 +58,8 @@ struct Sums {
   Lanes b[kUnknowns];
 };
 
-/// Adds weight * J^T J and -weight * J^T e. The entry named `kZero` is known to be zero.
+/// Adds weight * J^T J and -weight * J^T e. The entry named `kZero`, if not negative, is known to
+/// be zero.
 template <int kZero>
 inline void add_row(Sums& sums, const Lanes (&jacobian)[kUnknowns], Lanes weight, Lanes error) {
   int k = 0;
@@ -91,6 +92,83 @@ inline void add_points(Sums& sums, Lanes x, Lanes y, Lanes inverse_z, Lanes base
         row_u[0] - beta * y, row_u[1] + beta * x, y, -inverse_z, zero, row_u[5] - beta * inverse_z};
     add_row<4>(sums, row_right, weight_u, errors[2]);
   }
+}
+
+/// Four points in the camera frame.
+struct CameraPoints {
+  Lanes x, y, z;
+};
+
+inline CameraPoints transformed(const Task& task, Size i) {
+  const double* const R = task.rotation;
+  const Lanes xw = load(task.x + i), yw = load(task.y + i), zw = load(task.z + i);
+  return {all(R[0]) * xw + all(R[1]) * yw + all(R[2]) * zw + all(task.translation[0]),
+          all(R[3]) * xw + all(R[4]) * yw + all(R[5]) * zw + all(task.translation[1]),
+          all(R[6]) * xw + all(R[7]) * yw + all(R[8]) * zw + all(task.translation[2])};
+}
+
+/// Adds the row of a residual with the derivative (a, b, c) by the point in the camera frame.
+inline void add_general_row(Sums& sums, const CameraPoints& p, Lanes a, Lanes b, Lanes c,
+                            Lanes weight, Lanes error) {
+  const Lanes row[kUnknowns] = {p.y * c - p.z * b, p.z * a - p.x * c, p.x * b - p.y * a, a, b, c};
+  add_row<-1>(sums, row, weight, error);
+}
+
+/// Any camera: the error of a point p against its keypoint is (B.row(0) p, B.row(1) p) /
+/// (B.row(2) p) in pixels, with B the keypoint's sight.
+template <bool kStereo, bool kRobust, bool kSystem>
+inline double accumulate_sights(const Task& task, Size first, double* system) {
+  const Lanes huber2 = all(task.huber * task.huber), width = all(task.huber);
+  const Lanes one = all(1.0), tiny2 = all(kTinyDepth * kTinyDepth), bf = all(task.bf);
+  Sums sums;
+  for (Lanes& entry : sums.h) entry = all(0.0);
+  for (Lanes& entry : sums.b) entry = all(0.0);
+  Lanes cost = all(0.0);
+  for (Size i = first; i < task.n; i += kLanes) {
+    const CameraPoints p = transformed(task, i);
+    Lanes B[9];
+    for (Size k = 0; k < 9; ++k) B[k] = load(task.sight[k] + i);
+    const Lanes q = B[6] * p.x + B[7] * p.y + B[8] * p.z;
+    const Mask usable = kStereo ? (q * q > tiny2) & (p.z * p.z > tiny2) : q * q > tiny2;
+    const Lanes inverse = keep(usable, one / q);
+    Lanes weight = keep(usable, load(task.weight + i));
+    // Measurement minus prediction.
+    const Lanes error_u = -(B[0] * p.x + B[1] * p.y + B[2] * p.z) * inverse;
+    const Lanes error_v = -(B[3] * p.x + B[4] * p.y + B[5] * p.z) * inverse;
+    Lanes error_r = all(0.0), inverse_z = all(0.0);
+    Lanes square = error_u * error_u + error_v * error_v;
+    if constexpr (kStereo) {
+      inverse_z = keep(usable, one / p.z);
+      const Lanes disparity = load(task.u + i) - load(task.right_u + i);
+      error_r = error_u - disparity + bf * inverse_z;
+      square += error_r * error_r;
+    }
+    square *= weight;
+    if constexpr (kRobust) {
+      const Mask inside = square <= huber2;
+      const Lanes distance = root(square);
+      cost += inside ? square : all(2.0) * width * distance - huber2;
+      weight *= inside ? one : width / distance;
+    } else {
+      cost += square;
+    }
+    if constexpr (kSystem) {
+      const Lanes ua = -(B[0] + error_u * B[6]) * inverse, ub = -(B[1] + error_u * B[7]) * inverse;
+      const Lanes uc = -(B[2] + error_u * B[8]) * inverse;
+      add_general_row(sums, p, ua, ub, uc, weight, error_u);
+      add_general_row(sums, p, -(B[3] + error_v * B[6]) * inverse,
+                      -(B[4] + error_v * B[7]) * inverse, -(B[5] + error_v * B[8]) * inverse,
+                      weight, error_v);
+      if constexpr (kStereo) {
+        add_general_row(sums, p, ua, ub, uc - bf * inverse_z * inverse_z, weight, error_r);
+      }
+    }
+  }
+  if constexpr (kSystem) {
+    for (int k = 0; k < kTriangle; ++k) system[k] += sum(sums.h[k]);
+    for (int k = 0; k < kUnknowns; ++k) system[kTriangle + k] += sum(sums.b[k]);
+  }
+  return sum(cost);
 }
 
 /// On the normalised image plane every residual is in units of the focal length of its row, which
@@ -162,7 +240,9 @@ double accumulate(const Task& task, double* system) {
   }
   double cost = 0;
   for (Size pass = 0; pass < kPasses; ++pass) {
-    cost += accumulate_lanes<kStereo, kRobust, kSystem>(task, pass * kWidth, system);
+    const Size first = pass * kWidth;
+    cost += task.has_sights ? accumulate_sights<kStereo, kRobust, kSystem>(task, first, system)
+                            : accumulate_lanes<kStereo, kRobust, kSystem>(task, first, system);
   }
   return cost;
 }

@@ -19,17 +19,16 @@ std::optional<Residual> residual(const Eigen::Vector3d& p_c,
                                  const Eigen::Matrix<double, 3, 7>& derivative,
                                  const Camera& camera, const Eigen::Vector2d& pixel,
                                  double inverse_sigma2) {
-  if (!(std::abs(p_c.z()) > kTinyDepth)) return std::nullopt;
-  const double weight = std::sqrt(inverse_sigma2), inverse_z = 1 / p_c.z();
+  const Sight B = camera.sight(pixel.x(), pixel.y());
+  const Eigen::Vector3d q = B * p_c;
   // Behind the camera as well: an adjustment may lead a point through its plane and back.
-  const Pinhole& pinhole = camera.pinhole();
-  Eigen::Matrix<double, 2, 3> projection;
-  projection << pinhole.fx, 0, -pinhole.fx * p_c.x() * inverse_z,  //
-      0, pinhole.fy, -pinhole.fy * p_c.y() * inverse_z;
+  if (!(std::abs(q.z()) > kTinyDepth)) return std::nullopt;
+  const double weight = std::sqrt(inverse_sigma2), inverse_q = 1 / q.z();
+  const Eigen::Vector2d predicted = q.head<2>() * inverse_q;
   Residual result;
-  result.error = weight * (pixel - pinhole.project(p_c));
-  result.jacobian = -weight * inverse_z * projection * derivative;
-  result.depth = p_c.z();
+  result.error = -weight * predicted;
+  result.jacobian = -weight * inverse_q * (B.topRows<2>() - predicted * B.row(2)) * derivative;
+  result.depth = q.z();
   return result;
 }
 

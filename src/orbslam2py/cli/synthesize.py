@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from orbslam2py._arguments import number_of
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import Sensor
+from orbslam2py.settings import Sensor, Settings
 from orbslam2py.synthetic import (
     Corners,
     SyntheticMotion,
@@ -125,6 +125,14 @@ Exposure = Annotated[
 Size = Annotated[
     str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 640x480; streets: 1241x376]")
 ]
+Lens = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="SETTINGS",
+        help="Settings file of a camera through whose lens the images are seen: any camera model, "
+        "fisheye lenses as well. With --sensor mono or rgbd.",
+    ),
+]
 
 
 def synthesize(
@@ -141,6 +149,7 @@ def synthesize(
     motion: Motion = SyntheticMotion.SMOOTH,
     corners: Bends = Corners.ROUND,
     size: Size = None,
+    lens: Lens = None,
     seed: Annotated[int, typer.Option(help="Another seed, another world.")] = 0,
     noise: Annotated[float, typer.Option(help="Noise of the images [grey levels].")] = 0.0,
     depth_noise: Annotated[
@@ -187,6 +196,7 @@ def synthesize(
         overlap=overlap,
         lateral=lateral,
         yaw=yaw,
+        lens=None if lens is None else Settings.load(lens, Sensor.MONOCULAR).camera,
     )
     sequence = SyntheticSequence(options)
     console = Console(quiet=quiet)

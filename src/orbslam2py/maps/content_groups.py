@@ -17,7 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py import _core
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.errors import MapFileError
+from orbslam2py.settings.camera_model import CameraModel
 from orbslam2py.trajectory.rotations import (
     inverse_poses,
     poses_from,
@@ -62,9 +66,51 @@ class Cameras(ArrayGroup):
     scale_factor: Float32Array
     """Between the levels of the image pyramid."""
     n_levels: IntArray
+    model: IntArray
+    """Of a fisheye lens the place of its camera model in the list of models, from 1 on; 0 of a
+    pinhole. `camera_model` gives the model itself."""
+    lens: FloatArray
+    """(c, 16) parameters of that model, zeros after the last one."""
 
     def __len__(self) -> int:
         return len(self.fx)
+
+    def camera_model(self, row: int) -> CameraModel | None:
+        """Return the model of a fisheye lens, or None for a pinhole."""
+        number = int(self.model[row])
+        if number == 0:
+            return None
+        name, _, parameters = _core.camera_models()[number - 1]
+        size = (int(self.width[row]), int(self.height[row]))
+        return CameraModel(name, self.lens[row, : len(parameters)], size)
+
+
+#: Numbers that a map file keeps of a camera model.
+LENS_SIZE = 16
+
+
+def model_name_of(number: int) -> str:
+    """Return the name of a camera model by its number in `Cameras.model`; empty for 0."""
+    return _core.camera_models()[number - 1][0] if number else ""
+
+
+def model_number_of(name: str) -> int:
+    """Return the number of a camera model by its name.
+
+    Raises
+    ------
+    MapFileError
+        If there is no such model.
+    """
+    if not name:
+        return 0
+    names = [known for known, _, _ in _core.camera_models()]
+    if name not in names:
+        raise MapFileError(
+            f"the map has a camera of the model {shown(name)}, which this version does not know; "
+            "install the version that wrote the file, or a later one"
+        )
+    return names.index(name) + 1
 
 
 @dataclass(frozen=True, eq=False)

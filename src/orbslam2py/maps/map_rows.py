@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import IntArray
-from orbslam2py.maps.content_groups import Covisibility, Keyframes
+from orbslam2py.maps.content_groups import Covisibility, Keyframes, model_name_of
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.saved_map import Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.schema import (
@@ -159,6 +159,8 @@ def _camera_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
                 int(cameras.height[row]),
                 float(cameras.scale_factor[row]),
                 int(cameras.n_levels[row]),
+                model_name_of(int(cameras.model[row])),
+                cameras.lens[row].astype("<f8").tobytes(),
             ),
         )
 

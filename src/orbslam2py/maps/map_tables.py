@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
+    LENS_SIZE,
     Cameras,
     Covisibility,
     Keyframes,
     Observations,
     Points,
     RemovedKeyframes,
+    model_number_of,
 )
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_rows import Row, checksum
@@ -287,7 +289,20 @@ def _read_cameras(rows: list[Row], table: Table) -> Cameras:
         height=column("height", np.int64),
         scale_factor=column("scale_factor", np.float32),
         n_levels=column("n_levels", np.int64),
+        **_lenses(rows, table),
     )
+
+
+def _lenses(rows: list[Row], table: Table) -> dict[str, NDArray[Any]]:
+    """The models and parameters of fisheye lenses; zeros in files of earlier versions."""
+    if "model" not in table.columns:
+        return {"model": np.zeros(len(rows), np.int64), "lens": np.zeros((len(rows), LENS_SIZE))}
+    names, lenses = ([row[table.columns.index(name)] for row in rows] for name in ("model", "lens"))
+    numbers = [model_number_of(str(name)) for name in names]
+    if any(len(lens) != LENS_SIZE * 8 for lens in lenses):
+        raise MapFileError("the parameters of a camera model have the wrong length")
+    lens = np.array([np.frombuffer(lens, "<f8") for lens in lenses], np.float64)
+    return {"model": np.array(numbers, np.int64), "lens": lens.reshape(-1, LENS_SIZE)}
 
 
 def _column(rows: list[Row], place: int, dtype: Any) -> NDArray[Any]:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 #: Tells map files from other SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
 #: Version of the format that is written; later ones are refused. Version 1 had no words, and
-#: version 2 no rational lens (k4 to k6).
-FORMAT_VERSION = 3
+#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses.
+FORMAT_VERSION = 4
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
 #: Programs that know nothing of it take it for a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
@@ -102,6 +102,9 @@ class Table(NamedTuple):
 
 #: Further coefficients of a camera since version 3.
 RATIONAL_LENS = ("k4", "k5", "k6")
+#: Of a fisheye lens since version 4: name of the camera model, its parameters as float64 (16,),
+#: zeros after the last one. A pinhole has an empty name.
+FISHEYE_LENS = ("model", "lens")
 #: A pose as 7 float64: unit quaternion x, y, z, w, then the translation. A blob, because SQLite
 #: does not keep the sign of a zero in a REAL column.
 POSE = "pose"
@@ -118,6 +121,7 @@ TABLES = {
             (
                 *("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", *RATIONAL_LENS),
                 *("bf", "depth_ratio", "width", "height", "scale_factor", "n_levels"),
+                *FISHEYE_LENS,
             ),
         ),
         Table(
@@ -143,10 +147,11 @@ TABLES = {
 def tables_of(version: int) -> dict[str, Table]:
     """The tables of a version of the format."""
     older: dict[str, Table] = {}
-    if version < 3:
+    if version < 4:
+        later = (*FISHEYE_LENS, *(RATIONAL_LENS if version < 3 else ()))
         cameras = TABLES["cameras"]
-        plain = tuple(value for value in cameras.values if value not in RATIONAL_LENS)
-        older["cameras"] = cameras._replace(values=plain)
+        values = tuple(value for value in cameras.values if value not in later)
+        older["cameras"] = cameras._replace(values=values)
     if version < 2:
         older["keypoints"] = Table("keypoints", ("keyframe",), (), KEYPOINTS[:-1])
     return {**TABLES, **older}
@@ -167,7 +172,10 @@ def create_script(version: int = FORMAT_VERSION) -> str:
     keypoints = _blob_columns(tables["keypoints"].blobs)
     lens = [name for name in tables["cameras"].values if name in RATIONAL_LENS]
     rational_lens = "".join(f"  {name} REAL NOT NULL,\n" for name in lens)
-    return _CREATE.format(version=version, keypoints=keypoints, rational_lens=rational_lens)
+    fisheye = "  model TEXT NOT NULL,\n  lens BLOB NOT NULL,\n" if version >= 4 else ""
+    return _CREATE.format(
+        version=version, keypoints=keypoints, rational_lens=rational_lens, fisheye_lens=fisheye
+    )
 
 
 #: Bytes at the beginning of a file that say whose SQLite file it is.
@@ -233,7 +241,7 @@ CREATE TABLE cameras (
   height INTEGER NOT NULL,
   scale_factor REAL NOT NULL,
   n_levels INTEGER NOT NULL,
-  checksum INTEGER NOT NULL
+{{fisheye_lens}}  checksum INTEGER NOT NULL
 ) STRICT;
 
 CREATE TABLE keyframes (

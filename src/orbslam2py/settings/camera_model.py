@@ -134,6 +134,11 @@ class CameraModel:
         return tuple(self._core.parameter_names)
 
     @property
+    def core(self) -> _core.CameraModel:
+        """The camera of the C++ core, for use inside of the package."""
+        return self._core
+
+    @property
     def image_size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         return self._image_size

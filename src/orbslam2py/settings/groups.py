@@ -15,6 +15,8 @@ import numpy as np
 from orbslam2py._arguments import array_of, choice_of, is_whole, numbers_of, pose_of, shown
 from orbslam2py._arrays import FloatArray, MadeAgainByCopies
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.camera_model import CameraModel
+from orbslam2py.settings.fisheye import PINHOLE, checked_lens, checked_model
 from orbslam2py.settings.keys import check_group, focal_problems
 from orbslam2py.settings.projection import on_image_plane
 
@@ -27,18 +29,21 @@ def raise_if_any(problems: list[str]) -> None:
 
 #: Fields of `CameraSettings` in OpenCV's order of the coefficients.
 DISTORTION_FIELDS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+#: Models of `CameraModel` by the number of coefficients.
+_OPENCV_MODELS = {0: "pinhole", 4: "radtan4", 5: "radtan5", 8: "rational"}
 
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """Pinhole camera with OpenCV's radial-tangential or rational distortion.
+    """Pinhole camera with OpenCV's distortion, or a fisheye camera.
 
     Attributes
     ----------
     fx, fy, cx, cy
         Focal lengths and principal point in pixels; the centre of the top-left pixel is (0, 0).
     k1, k2, p1, p2, k3
-        Radial-tangential distortion in OpenCV's order; all 0 for rectified images.
+        Radial-tangential distortion in OpenCV's order; all 0 for rectified images and fisheye
+        lenses.
     width, height
         Image size in pixels as far as known. Never enforced: the first image decides.
     fps
@@ -49,6 +54,20 @@ class CameraSettings:
         Whether colour images are RGB (True) or BGR.
     k4, k5, k6
         Denominator of the rational distortion model; all 0 for the radial-tangential model.
+    model
+        ``pinhole``, or the name of a fisheye model of `orbslam2py.CameraModel`:
+        ``kannala_brandt``, ``double_sphere``, ``eucm``, ``mei`` or ``fov``. Other names of these
+        are replaced by them.
+    lens
+        Parameters of the fisheye model after fx, fy, cx, cy, in the order of
+        `orbslam2py.CameraModel`; empty for ``pinhole``. ``kannala_brandt``: k1, k2, k3, k4;
+        ``double_sphere``: xi, alpha; ``eucm``: alpha, beta; ``mei``: xi, k1, k2, p1, p2; ``fov``:
+        omega.
+
+    Raises
+    ------
+    SettingsError
+        Naming all values that are wrong, by the keys of the settings file.
     """
 
     fx: float
@@ -68,9 +87,55 @@ class CameraSettings:
     k4: float = 0.0
     k5: float = 0.0
     k6: float = 0.0
+    model: str = PINHOLE
+    lens: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         raise_if_any(check_group("camera", self))
+        object.__setattr__(self, "model", checked_model(self.model))
+        object.__setattr__(self, "lens", checked_lens(self.model, self.lens))
+        if self.is_fisheye:
+            self._check_fisheye()
+
+    def _check_fisheye(self) -> None:
+        given = [name for name in DISTORTION_FIELDS if getattr(self, name)]
+        if given:
+            raise SettingsError(
+                f"{', '.join(given)} are coefficients of a pinhole camera, and the model is "
+                f"{self.model}; give the coefficients of the fisheye lens as lens, and leave "
+                f"{', '.join(given)} out"
+            )
+        # The size matters for the check of the focal length alone.
+        self.camera_model(self.width or 1, self.height or 1)
+
+    @property
+    def is_fisheye(self) -> bool:
+        """Whether the camera has a fisheye model; its keypoints are raw pixels then."""
+        return self.model != PINHOLE
+
+    def camera_model(self, width: int, height: int) -> CameraModel:
+        """Return the camera with its lens, for images of a size.
+
+        Parameters
+        ----------
+        width, height
+            Size of the images in pixels.
+
+        Returns
+        -------
+        CameraModel
+            A fisheye model, or ``pinhole``, ``radtan4``, ``radtan5`` or ``rational``.
+
+        Raises
+        ------
+        SettingsError
+            If the size is none, or the focal lengths cannot belong to images of this size.
+        """
+        intrinsics = (self.fx, self.fy, self.cx, self.cy)
+        if self.is_fisheye:
+            return CameraModel(self.model, (*intrinsics, *self.lens), (width, height))
+        lens = self.distortion.tolist() if self.is_distorted else []
+        return CameraModel(_OPENCV_MODELS[len(lens)], (*intrinsics, *lens), (width, height))
 
     @property
     def matrix(self) -> FloatArray:
@@ -82,7 +147,7 @@ class CameraSettings:
         """Coefficients in OpenCV's order, float64 (4,), (5,) or (8,).
 
         k1, k2, p1, p2; with k3 only if it is not 0; with k3, k4, k5, k6 if one of the last three
-        is not 0.
+        is not 0. All 0 for a fisheye lens, whose parameters are in `lens`.
         """
         four = [self.k1, self.k2, self.p1, self.p2]
         if self.k4 or self.k5 or self.k6:
@@ -91,7 +156,7 @@ class CameraSettings:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether any distortion coefficient is not 0."""
+        """Whether a pinhole camera has a distortion coefficient that is not 0."""
         return bool(np.any(self.distortion))
 
     def project(
@@ -108,13 +173,15 @@ class CameraSettings:
             in camera coordinates (x right, y down, z forward) already.
         distort
             Give pixels of the images as they come. False: undistorted pixels, as the keypoints of
-            `orbslam2py.FrameFeatures` are; there is no difference for rectified images.
+            `orbslam2py.FrameFeatures` are; there is no difference for rectified images, nor for
+            fisheye lenses, whose keypoints are pixels of the images.
 
         Returns
         -------
         FloatArray
             Pixels u, v, float64 (n, 2), also beside the image. NaN for points that are not in front
-            of the camera, or so far aside that the distortion says nothing of them.
+            of the camera, or so far aside that the distortion says nothing of them. A fisheye lens
+            shows points behind the camera as far as its model reaches.
 
         Raises
         ------
@@ -125,7 +192,10 @@ class CameraSettings:
         if T_cw is not None:
             T = pose_of(T_cw, "T_cw")
             positions = positions @ T[:3, :3].T + T[:3, 3]
-        lens = self.distortion if choice_of(distort, "distort") else None
+        bent = choice_of(distort, "distort")
+        if self.is_fisheye:
+            return self.camera_model(self.width or 1, self.height or 1).project(positions)
+        lens = self.distortion if bent else None
         plane = on_image_plane(positions, lens)
         return plane * (self.fx, self.fy) + (self.cx, self.cy)
 

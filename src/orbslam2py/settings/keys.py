@@ -15,6 +15,7 @@ import numpy as np
 
 from orbslam2py._arguments import float_of, is_number, shown
 from orbslam2py._arrays import FloatArray
+from orbslam2py.settings.fisheye import FISHEYE_PARAMETERS
 from orbslam2py.settings.sensor import Sensor
 
 _ALL = frozenset(Sensor)
@@ -182,7 +183,10 @@ RECTIFICATION_KEYS: tuple[str, ...] = tuple(
     for name in ("K", "D", "R", "P", "width", "height")
 )
 
-_NAMES = (*(key.name for key in KEYS), *RECTIFICATION_KEYS)
+#: Of fisheye lenses, which have other numbers than pinholes.
+FISHEYE_KEYS = tuple(f"Camera.{name}" for name in FISHEYE_PARAMETERS)
+
+_NAMES = (*(key.name for key in KEYS), *FISHEYE_KEYS, *RECTIFICATION_KEYS)
 
 
 def is_known(name: str) -> bool:

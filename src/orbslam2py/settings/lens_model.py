@@ -1,77 +1,142 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which lens a settings file is for, as the files of ORB-SLAM3 and stella_vslam tell it."""
+"""Which lens a settings file is for, and the parameters of a fisheye lens."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.fisheye import (
+    FISHEYE_PARAMETERS,
+    LENS_PARAMETERS,
+    NO_FISHEYE_PAIR,
+    PINHOLE,
+    TYPES,
+    fisheye_model,
+)
 from orbslam2py.settings.foreign import new_line
-from orbslam2py.settings.opencv_yaml import Entry, Problem, parse_number
+from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, parse_number, read_number
 from orbslam2py.settings.sensor import Sensor
 
-#: Keys that name the model of the lens, and flags that tell a fisheye.
-_MODEL_KEYS = (
-    "Camera.type",
-    "Camera1.type",
-    "Camera2.type",
-    "Camera.model",
-    "StereoRectifier.model",
-)
+#: Keys that name the model of the lens, and a flag of a fisheye.
+RECTIFIER_MODEL = "StereoRectifier.model"
+_MODEL_KEYS = ("Camera.type", "Camera1.type", "Camera.model")
 _FISHEYE_FLAG = "Camera.bFishEye"
-LENS_KEYS = (*_MODEL_KEYS, _FISHEYE_FLAG)
+LENS_KEYS = (*_MODEL_KEYS, "Camera2.type", RECTIFIER_MODEL, _FISHEYE_FLAG)
 
 _PINHOLES = ("pinhole", "rectified", "perspective")
-_FISHEYES = (
-    "kannalabrandt8",
-    "kannalabrandt",
-    "kannala_brandt",
-    "fisheye",
-    "equidistant",
-    "kb8",
-    "kb4",
-)
 _OTHER_LENSES = {
     "equirectangular": "images of all directions (equirectangular)",
     "radial_division": "a lens with the division model of distortion",
 }
+#: Distortion of a pinhole, in the order of the fields of `CameraSettings`.
+_COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
-def refuse_other_lenses(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> None:
-    """Raise `SettingsError` with what to do if the file is not for a pinhole camera.
+@dataclass(frozen=True)
+class FileLens:
+    """The lens that a settings file names.
+
+    Attributes
+    ----------
+    model
+        "pinhole", or a fisheye model of `orbslam2py.settings.fisheye.LENS_PARAMETERS`.
+    entry
+        The entry that names it; None if none does.
+    """
+
+    model: str
+    entry: Entry | None = None
+
+    @property
+    def named(self) -> str:
+        """How the file names it."""
+        return "" if self.entry is None else f"{self.entry.key} {self.entry.value}"
+
+
+def lens_of_file(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> FileLens:
+    """Find the lens of a settings file.
 
     Parameters
     ----------
     entries
         The entries of the file, nested ones by their path.
     path, sensor
-        Of the file, and what it is read for: for the message.
+        Of the file, and what it is read for.
+
+    Raises
+    ------
+    SettingsError
+        If the model is unknown or not supported, the file contradicts itself, or its coefficients
+        are those of a fisheye lens and it names none; with what to do.
     """
-    for key in _MODEL_KEYS:
-        entry = entries.get(key)
-        if entry is None:
-            continue
-        model = str(entry.value).lower()
-        if model in _FISHEYES:
-            _refuse_fisheye(entry, f"{key} {entry.value}", path, sensor)
-        if model not in _PINHOLES:
-            what = _OTHER_LENSES.get(model, f"a lens of the model {entry.value}")
-            text = (
-                f"{key} is {entry.value}: the file is for {what}, and orbslam2py tracks images of "
-                "a pinhole camera; allowed: PinHole, Rectified, perspective. Make pinhole images "
-                "of them first (undistorted, or cut out), and settings of these:\n"
-                f"    {new_line(sensor)}"
-            )
-            raise SettingsError(Problem(entry.line, text).located(path))
+    keys: tuple[str, ...] = _MODEL_KEYS
+    if sensor is Sensor.STEREO:
+        keys += ("Camera2.type", RECTIFIER_MODEL)
+    elif RECTIFIER_MODEL in entries:  # the raw left camera is taken
+        keys = (RECTIFIER_MODEL,)
+    found = [_lens_of_entry(entries[key], path, sensor) for key in keys if key in entries]
     flag = entries.get(_FISHEYE_FLAG)
     if flag is not None and _value(flag) != 0:
-        _refuse_fisheye(flag, f"{_FISHEYE_FLAG} {flag.value}", path, sensor)
+        found.append(FileLens("kannala_brandt", flag))
+    lens = found[0] if found else FileLens(PINHOLE)
+    if sensor is Sensor.STEREO:
+        for one in found:
+            if one.model != PINHOLE:
+                _refuse(one.entry, f"{one.named}: {NO_FISHEYE_PAIR}:\n    {new_line(sensor)}", path)
+    for other in found[1:]:
+        if other.model != lens.model:
+            text = f"{other.named} contradicts {lens.named}; keep the one that is right"
+            _refuse(other.entry, text, path)
+    if lens.model == PINHOLE:
+        _refuse_unnamed_fisheye(entries, lens, path)
+    return lens
+
+
+def _lens_of_entry(entry: Entry, path: Path, sensor: Sensor) -> FileLens:
+    name = str(entry.value)
+    if name.lower() in _PINHOLES:
+        return FileLens(PINHOLE, entry)
+    model = fisheye_model(name)
+    if model is not None:
+        return FileLens(model, entry)
+    what = _OTHER_LENSES.get(name.lower(), f"a lens of the model {name}")
+    text = (
+        f"{entry.key} is {name}: the file is for {what}, which is not supported; allowed: PinHole, "
+        f"Rectified, perspective, {', '.join(TYPES.values())}. Make pinhole images of them first "
+        f"(undistorted, or cut out), and settings of these:\n    {new_line(sensor)}"
+    )
+    raise SettingsError(Problem(entry.line, text).located(path))
+
+
+def _refuse(entry: Entry | None, text: str, path: Path) -> None:
+    raise SettingsError(Problem(None if entry is None else entry.line, text).located(path))
+
+
+def _refuse_unnamed_fisheye(entries: Mapping[str, Entry], lens: FileLens, path: Path) -> None:
+    """Refuse coefficients of a fisheye lens in the file of a pinhole."""
+    named = f"write {TYPES['kannala_brandt']} in place of {lens.entry.value}" if lens.entry else ""
     for camera in ("Camera", "Camera1", "Camera2"):
         if _has_four_radial(entries, camera):
-            entry = entries[f"{camera}.k4"]
-            why = f"{camera}.k4 without k5 and k6"
-            _refuse_fisheye(entry, why, path, sensor)
+            key = f"{camera}.k4"
+            _refuse(
+                entries[key],
+                f"{key} without k5 and k6 belongs to a fisheye calibration (Kannala-Brandt, k1 to "
+                f"k4). If it is one, {named or 'add the line Camera.type: KannalaBrandt8'}; if it "
+                "is a rational distortion, add k5 and k6 (0 if there are none)",
+                path,
+            )
+        for name in FISHEYE_PARAMETERS:
+            entry = entries.get(f"{camera}.{name}")
+            if entry is None:
+                continue
+            models = [TYPES[m] for m, names in LENS_PARAMETERS.items() if name in names]
+            has = f"{lens.named} has no such parameter" if lens.entry else "Camera.type is missing"
+            text = f"{entry.key} belongs to a fisheye lens, and {has}; give Camera.type: "
+            _refuse(entry, f"{text}{' or '.join(models)}", path)
 
 
 def _has_four_radial(entries: Mapping[str, Entry], camera: str) -> bool:
@@ -83,16 +148,52 @@ def _has_four_radial(entries: Mapping[str, Entry], camera: str) -> bool:
     return _value(k4) != 0 or not tangential
 
 
-def _refuse_fisheye(entry: Entry, why: str, path: Path, sensor: Sensor) -> None:
-    text = (
-        f"{why} belongs to a fisheye calibration (Kannala-Brandt, k1 to k4). orbslam2py has the "
-        "pinhole model; with these numbers in it every map would be bent. Undistort the images "
-        "first, with cv2.fisheye.estimateNewCameraMatrixForUndistortRectify (gives new_K), "
-        "cv2.fisheye.initUndistortRectifyMap(K, D, R, new_K, size, cv2.CV_16SC2) and cv2.remap, "
-        "and make settings of new_K without distortion:\n"
-        f"    {new_line(sensor)}"
-    )
-    raise SettingsError(Problem(entry.line, text).located(path))
+def take_lens(document: Document, lens: FileLens) -> dict[str, Any]:
+    """Take the parameters of a fisheye lens out of the entries of a file.
+
+    Parameters
+    ----------
+    document
+        The entries by our names; those of the lens are removed. Takes the problems.
+    lens
+        As `lens_of_file` finds it.
+
+    Returns
+    -------
+    dict
+        The fields ``model`` and ``lens`` of `CameraSettings`; empty for a pinhole, and if something
+        is wrong.
+    """
+    if lens.model == PINHOLE:
+        return {}
+    names, line = LENS_PARAMETERS[lens.model], lens.entry.line if lens.entry else None
+    listed = ", ".join(f"Camera.{name}" for name in names)
+    given = {
+        name: document.entries.pop(f"Camera.{name}")
+        for name in (*_COEFFICIENTS, *FISHEYE_PARAMETERS)
+        if f"Camera.{name}" in document.entries
+    }
+    n_before = len(document.problems)
+    for name, entry in given.items():
+        if name not in names and _value(entry) != 0:
+            text = (
+                f"{entry.key} is {entry.value}, and the lens of {lens.named} has {listed} alone; "
+                f"remove {entry.key}, or name the right model"
+            )
+            document.problems.append(Problem(entry.line, text))
+    lacking = [f"Camera.{name}" for name in names if name not in given]
+    if lacking:
+        text = f"{', '.join(lacking)}: not in the file; the lens of {lens.named} needs {listed}"
+        document.problems.append(Problem(line, text))
+    numbers = []
+    for name in names:
+        try:
+            numbers += [read_number(given[name])] if name in given else []
+        except ValueError as error:
+            document.problems.append(Problem(given[name].line, f"{error}; give a finite number"))
+    if len(document.problems) > n_before:
+        return {}
+    return {"model": lens.model, "lens": tuple(numbers)}
 
 
 def _value(entry: Entry) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.fisheye import LENS_PARAMETERS
 from orbslam2py.settings.groups import (
     DISTORTION_FIELDS,
     CameraRectification,
@@ -149,9 +150,12 @@ def stella_pair(
 
 
 def stella_raw_camera(
-    given: Mapping[str, Entry], problems: list[Problem]
+    given: Mapping[str, Entry], problems: list[Problem], *, fisheye: bool = False
 ) -> dict[str, float] | None:
-    """Read fx, fy, cx, cy and the distortion of the raw left camera of a ``StereoRectifier``."""
+    """Read fx, fy, cx, cy and the distortion of the raw left camera of a ``StereoRectifier``.
+
+    The distortion of a fisheye is k1, k2, k3, k4.
+    """
     names = ("StereoRectifier.K_left", "StereoRectifier.D_left")
     missing = [name for name in names if name not in given]
     if missing:
@@ -164,13 +168,15 @@ def stella_raw_camera(
     except ValueError as error:
         problems.append(Problem(given[names[0]].line, str(error)))
         return None
-    if D.size not in (4, 5, 8):
-        text = f"{names[1]} must have 4, 5 or 8 coefficients, not {D.size}"
+    if D.size not in ((4,) if fisheye else (4, 5, 8)):
+        wanted = "4 coefficients of a fisheye lens" if fisheye else "4, 5 or 8 coefficients"
+        text = f"{names[1]} must have {wanted}, not {D.size}"
         problems.append(Problem(given[names[1]].line, text))
         return None
     intrinsics = (K[0, 0], K[1, 1], K[0, 2], K[1, 2])
     values = dict(zip(_INTRINSICS, map(float, intrinsics), strict=True))
-    return values | dict(zip(DISTORTION_FIELDS, D.tolist(), strict=False))
+    fields = LENS_PARAMETERS["kannala_brandt"] if fisheye else DISTORTION_FIELDS
+    return values | dict(zip(fields, D.tolist(), strict=False))
 
 
 def _camera(

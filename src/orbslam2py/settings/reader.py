@@ -32,7 +32,7 @@ from orbslam2py.settings.groups import (
     ViewerSettings,
     thresholds_swapped,
 )
-from orbslam2py.settings.lens_model import refuse_other_lenses
+from orbslam2py.settings.lens_model import FileLens, lens_of_file, take_lens
 from orbslam2py.settings.opencv_yaml import (
     Document,
     Entry,
@@ -121,7 +121,7 @@ def groups_of_text(
     given = flat(scan(text))
     if not any(schema.is_known(name) or is_translated(name) for name in given):
         _refuse_camera_file(path, text, sensor)
-    refuse_other_lenses(given, path, sensor)
+    lens = lens_of_file(given, path, sensor)
     problems = document.problems
     if not document.entries:
         raise SettingsError(
@@ -129,6 +129,7 @@ def groups_of_text(
             f"{new_line(sensor)}"
         )
     notes = _check_names(document, path, allow_unknown=allow_unknown)
+    fisheye = take_lens(document, lens)
     values = _read_values(document, sensor)
     missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
@@ -153,12 +154,20 @@ def groups_of_text(
         warn(note)
 
     return SettingsGroups(
-        camera=CameraSettings(**values["camera"]),
+        camera=_camera(values["camera"] | fisheye, lens, path),
         orb=OrbSettings(**values["orb"]),
         depth=DepthSettings(**values["depth"]) if sensor.has_depth else None,
         rectification=rectification,
         viewer=ViewerSettings(**values["viewer"]),
     )
+
+
+def _camera(values: dict[str, Any], lens: FileLens, path: Path) -> CameraSettings:
+    try:
+        return CameraSettings(**values)
+    except SettingsError as error:  # of the lens; the single values are right
+        line = None if lens.entry is None else lens.entry.line
+        raise SettingsError(Problem(line, str(error)).located(path)) from None
 
 
 def _served_by(document: Document) -> list[Sensor]:

@@ -20,6 +20,7 @@ from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_file, is_builtin_name
 from orbslam2py.settings.doubts import find_doubts
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, NO_FISHEYE_PAIR
 from orbslam2py.settings.groups import (
     DISTORTION_FIELDS,
     CameraSettings,
@@ -107,6 +108,8 @@ class Settings:
                     "DepthMapFactor (depth.raw_per_metre) is missing; rgbd needs it: 1000 for "
                     "millimetres, 5000 for TUM, 1 for metres"
                 )
+        if self.sensor is Sensor.STEREO and self.camera.is_fisheye:
+            problems.append(NO_FISHEYE_PAIR)
         raise_if_any(problems)
 
     def _check_types(self) -> None:
@@ -235,13 +238,10 @@ class Settings:
     def describe(self) -> list[str]:
         """Say line by line what a log should hold about these settings."""
         camera, orb = self.camera, self.orb
-        distortion = camera.distortion
-        names = ", ".join(DISTORTION_FIELDS[: len(distortion)])
-        values = ", ".join(f"{value:g}" for value in distortion)
         lines = [
             f"camera ({self.sensor}): fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, "
             f"cy {camera.cy:g}, {camera.fps:g} fps, colour order {'RGB' if camera.rgb else 'BGR'}",
-            f"distortion ({names}): {values}" if camera.is_distorted else "no distortion",
+            _lens_line(camera),
             f"ORB: {orb.n_features} features, {orb.n_levels} levels, factor {orb.scale_factor:g}, "
             f"FAST thresholds {orb.ini_th_fast} and {orb.min_th_fast}"
             + (", coordinates of the original" if orb.original_coordinates else ""),
@@ -253,6 +253,17 @@ class Settings:
         if self.sensor is Sensor.RGBD:
             lines.append(f"depth images: {self.depth_factor:g} units per metre")
         return lines
+
+
+def _lens_line(camera: CameraSettings) -> str:
+    """Say what the lens is."""
+    if camera.is_fisheye:
+        named = zip(LENS_PARAMETERS[camera.model], camera.lens, strict=True)
+        return f"fisheye lens {camera.model}: {', '.join(f'{n} {value:g}' for n, value in named)}"
+    if not camera.is_distorted:
+        return "no distortion"
+    names = ", ".join(DISTORTION_FIELDS[: len(camera.distortion)])
+    return f"distortion ({names}): {', '.join(f'{value:g}' for value in camera.distortion)}"
 
 
 def builtin_settings(name: str, sensor: Sensor | str) -> Settings:

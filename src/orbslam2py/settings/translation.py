@@ -6,8 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from orbslam2py.settings.fisheye import FISHEYE_PARAMETERS, fisheye_model
 from orbslam2py.settings.groups import StereoRectification, usual_n_features
-from orbslam2py.settings.lens_model import LENS_KEYS
+from orbslam2py.settings.lens_model import LENS_KEYS, RECTIFIER_MODEL
 from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, flat, parse_number
 from orbslam2py.settings.raw_pairs import (
     LENS_NUMBERS,
@@ -21,7 +22,9 @@ from orbslam2py.settings.raw_pairs import (
 from orbslam2py.settings.sensor import Sensor
 
 #: Other names of our keys, with values of the same meaning and unit.
-_RENAMED = {f"Camera1.{name}": f"Camera.{name}" for name in LENS_NUMBERS} | {
+_RENAMED = {
+    f"Camera1.{name}": f"Camera.{name}" for name in (*LENS_NUMBERS, *FISHEYE_PARAMETERS)
+} | {
     # ORB-SLAM3 1.0
     "Stereo.ThDepth": "ThDepth",
     "RGBD.DepthMapFactor": "DepthMapFactor",
@@ -48,7 +51,8 @@ _RESIZED = {"Camera.newWidth": "Camera.width", "Camera.newHeight": "Camera.heigh
 _SCALE = "Camera.imageScale"
 #: Of the second camera, which only a pair has.
 _SECOND_CAMERA = (*(f"Camera2.{name}" for name in LENS_NUMBERS), RELATIVE_POSE, *RECTIFIER_KEYS)
-_FISHEYE_PAIR = "Tlr"
+#: Of the second camera of a fisheye pair; not used for one camera, and unknown for stereo.
+_FISHEYE_PAIR = ("Tlr", *(f"Camera2.{name}" for name in FISHEYE_PARAMETERS))
 
 _TAKEN = frozenset(
     {*_RENAMED, *LENS_KEYS, *_RESIZED, *_SECOND_CAMERA} | {_BASELINE, _COLOUR_ORDER, _SCALE}
@@ -89,7 +93,7 @@ def translate(document: Document, sensor: Sensor) -> Translated:
     given = flat(document)
     result = Translated(problems=document.problems)
     for name, entry in given.items():
-        if name not in _TAKEN and not (name == _FISHEYE_PAIR and sensor is not Sensor.STEREO):
+        if name not in _TAKEN and not (name in _FISHEYE_PAIR and sensor is not Sensor.STEREO):
             result.entries[name] = entry
     for name, ours in _RENAMED.items():
         if name in given:
@@ -205,7 +209,9 @@ def _translate_pair(result: Translated, given: Mapping[str, Entry]) -> None:
 
 def _take_raw_camera(result: Translated, given: Mapping[str, Entry]) -> None:
     """Take the raw left camera, whose images one camera alone delivers, for the rectified one."""
-    values = stella_raw_camera(given, result.problems)
+    model = given.get(RECTIFIER_MODEL)
+    fisheye = model is not None and fisheye_model(model.value) is not None
+    values = stella_raw_camera(given, result.problems, fisheye=fisheye)
     if values is None:
         return
     for name in LENS_NUMBERS:

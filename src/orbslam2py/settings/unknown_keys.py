@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 
-from orbslam2py.settings.keys import KEYS, RECTIFICATION_KEYS, nearest_key
+from orbslam2py.settings.keys import FISHEYE_KEYS, KEYS, RECTIFICATION_KEYS, nearest_key
 from orbslam2py.settings.opencv_yaml import Entry, parse_number
 
 #: Groups of keys that describe a camera or how two of them stand.
@@ -29,7 +29,7 @@ _OTHER_GROUPS = ("imu", "system", "file")
 #: Keys of a camera that say nothing of its images.
 _OF_NO_EFFECT = re.compile(r"name|setup|(over)?lapping(begin|end)", re.IGNORECASE)
 
-_OURS = (*(key.name for key in KEYS), *RECTIFICATION_KEYS)
+_OURS = (*(key.name for key in KEYS), *FISHEYE_KEYS, *RECTIFICATION_KEYS)
 _OUR_GROUPS = {name.rpartition(".")[0].lower() for name in _OURS}
 #: From here on two names, or two of a camera, are spelt alike.
 _ALIKE, _ALIKE_OF_CAMERA = 0.8, 0.6

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.settings.groups import SettingsGroups
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, TYPES
+from orbslam2py.settings.groups import DISTORTION_FIELDS, CameraSettings, SettingsGroups
 from orbslam2py.settings.keys import KEYS, Key
 from orbslam2py.settings.sensor import Sensor
 
@@ -32,7 +33,11 @@ def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
         if values is None:
             continue
         lines += ["", f"# {title}"]
+        fisheye = group == "camera" and groups["camera"].is_fisheye
+        lines += _lens_lines(groups["camera"]) if fisheye else []
         for key in KEYS:
+            if fisheye and key.field in DISTORTION_FIELDS:
+                continue
             value = getattr(values, key.field) if key.group == group else None
             if key.field in _RATIONAL and len(groups["camera"].distortion) < 8:
                 continue
@@ -47,6 +52,13 @@ def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
             for name in "KDRP":
                 lines += _matrix(f"{side}.{name}", getattr(camera, name))
     return "\n".join(lines) + "\n"
+
+
+def _lens_lines(camera: CameraSettings) -> list[str]:
+    """The model of a fisheye lens and its parameters."""
+    names = LENS_PARAMETERS[camera.model]
+    lines = [f"Camera.type: {TYPES[camera.model]}"]
+    return lines + [f"Camera.{n}: {value!r}" for n, value in zip(names, camera.lens, strict=True)]
 
 
 def _number(key: Key, value: float) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -281,6 +282,10 @@ def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
 
 def _camera_options(settings: Settings, width: int, height: int) -> core.CameraOptions:
     camera = settings.camera
+    # A fisheye model replaces the pinhole's numbers.
+    lens: dict[str, Any] = {}
+    if camera.is_fisheye:
+        lens["model"] = camera.camera_model(width, height).core
     return core.CameraOptions(
         fx=camera.fx,
         fy=camera.fy,
@@ -291,10 +296,5 @@ def _camera_options(settings: Settings, width: int, height: int) -> core.CameraO
         distortion=camera.distortion.tolist(),
         bf=camera.bf,
         depth_ratio=settings.depth.close_factor if settings.depth is not None else 0.0,
+        **lens,
     )
-
-
-def intrinsics(camera: core.Camera) -> npt.NDArray[np.float64]:
-    """Focal lengths and principal point fx, fy, cx, cy of a camera, float64 (4,), pixels."""
-    pinhole = camera.pinhole
-    return np.array([pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy])

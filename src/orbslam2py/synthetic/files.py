@@ -102,6 +102,10 @@ def write_sequence(
 ) -> Path:
     """Write a sequence; see `SyntheticSequence.write`."""
     chosen = choose_layout(layout, sequence.sensor)
+    if sequence.options.lens is not None and chosen is not Layout.TUM:
+        raise SettingsError(
+            f"the layout {chosen} has no place for the lens of the camera; take the layout tum"
+        )
     writers: dict[Layout, Callable[[WritableSequence, Path, Progress], None]] = {
         Layout.TUM: _write_tum,
         Layout.KITTI: _write_kitti,

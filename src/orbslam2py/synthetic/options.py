@@ -9,7 +9,7 @@ from typing import Any
 
 from orbslam2py._arguments import is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import Sensor
+from orbslam2py.settings import CameraSettings, Sensor
 from orbslam2py.synthetic.motions import SyntheticMotion
 from orbslam2py.synthetic.scenes import (
     CORNERED,
@@ -83,6 +83,10 @@ class SyntheticOptions:
         walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the blocks).
     yaw
         Degrees to the right of the direction of travel.
+    lens
+        Camera with width and height, through whose lens the images are seen: any model that
+        `orbslam2py.CameraSettings` has. One camera or RGB-D, without `blur` and `size`. None for a
+        pinhole without distortion.
 
     Raises
     ------
@@ -113,6 +117,7 @@ class SyntheticOptions:
     gap: float | None = None
     overlap: float | None = None
     length: float | None = None
+    lens: CameraSettings | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -126,6 +131,7 @@ class SyntheticOptions:
         _check_range("speed", self.speed, 0.001, 100)
         if self.size is not None:
             _check_size(self.size)
+        self._check_lens()
         seed_of(self.seed, most=2**31 - 1)
         _check_range("noise", self.noise, 0, 100)
         _check_exposure(self.exposure)
@@ -156,6 +162,27 @@ class SyntheticOptions:
         if self.length is not None and self.world is not SyntheticWorld.STREET:
             raise SettingsError(
                 f"length does not apply to the {self.world}, whose size is fixed; take the street"
+            )
+
+    def _check_lens(self) -> None:
+        if self.lens is None:
+            return
+        if not isinstance(self.lens, CameraSettings):
+            raise SettingsError(f"lens is {shown(self.lens)}; give CameraSettings(...)")
+        if self.lens.width is None or self.lens.height is None:
+            raise SettingsError(
+                "the camera of lens has no image size; give its width and height "
+                "(Camera.width and Camera.height in a settings file)"
+            )
+        _check_size((self.lens.width, self.lens.height))
+        if self.size is not None:
+            raise SettingsError("size and lens exclude each other: the camera of lens has a size")
+        if self.blur:
+            raise SettingsError("blur is made for pinhole images alone; leave blur or lens out")
+        if self.sensor is Sensor.STEREO:
+            raise SettingsError(
+                "a stereo pair is made of pinhole images alone; take the sensor mono or rgbd, or "
+                "leave lens out"
             )
 
     def _check_pieces(self) -> None:

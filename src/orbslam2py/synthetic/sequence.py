@@ -11,10 +11,13 @@ The same options give the same bytes in every run.
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +34,7 @@ from orbslam2py.synthetic.motions import Motion, SyntheticMotion
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.synthetic.pieces import arrange
 from orbslam2py.synthetic.scenes import LAPS, Corners, SyntheticWorld, make_scene
+from orbslam2py.synthetic.wide_view import WideView
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import inverse_poses
 
@@ -77,6 +81,8 @@ class SyntheticSequence(FramesInOrder):
 
     @property
     def _size(self) -> tuple[int, int]:
+        if (seen_through := self.options.lens) is not None:
+            return seen_through.width or 0, seen_through.height or 0
         return self.options.size or ((1241, 376) if self._scene.outdoors else (640, 480))
 
     def _frames_of_whole_way(self) -> int:
@@ -119,8 +125,11 @@ class SyntheticSequence(FramesInOrder):
     def camera(self) -> CameraSettings:
         """The camera; both cameras of a pair are alike."""
         width, height = self._size
-        f = (0.58 if self._scene.outdoors else 0.625) * width
         baseline = 0.54 if self._scene.outdoors else 0.1
+        if (seen_through := self.options.lens) is not None:
+            bf = baseline * seen_through.fx if self.sensor.has_depth else 0.0
+            return replace(seen_through, fps=self._fps, bf=bf)
+        f = (0.58 if self._scene.outdoors else 0.625) * width
         return CameraSettings(
             fx=f,
             fy=f,
@@ -356,35 +365,72 @@ class SyntheticSequence(FramesInOrder):
         noise: float | None = None,
         seconds: float = 0.0,
     ) -> tuple[ByteArray, NDArray[np.float32]]:
-        grey, depth = self._rendered(self._built, T_wc, number, exposure, noise)
-        for part, world in zip(self._scene.moving, self._built_parts, strict=True):
-            # A part that moves is one that stands still and a camera that moves the other way.
-            T_pc = T_wc.copy()
-            T_pc[:3, 3] -= part.shift(seconds)
-            grey_part, depth_part = self._rendered(world, T_pc, number, exposure, noise)
-            before = (depth_part > 0) & ((depth == 0) | (depth_part < depth))
-            grey, depth = np.where(before, grey_part, grey), np.where(before, depth_part, depth)
-        return grey, depth
-
-    def _rendered(
-        self, world: core.World, T_wc: FloatArray, number: int, exposure: float, noise: float | None
-    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        noise = self.options.noise if noise is None else noise
+        if self._wide_view is not None:
+            side = functools.partial(self._side, T_wc, seconds)
+            image, depth = self._wide_view.render(side)
+            return lens.exposed(image, exposure, noise, [self.options.seed, number]), depth
         camera = self.camera
         width, height = self._size
-        grey, depth = core.render(
-            world,
-            inverse_poses(T_wc),
+        return self._composed(
+            T_wc,
+            seconds,
             fx=camera.fx,
             fy=camera.fy,
             cx=camera.cx,
             cy=camera.cy,
             width=width,
             height=height,
-            noise=self.options.noise if noise is None else noise,
+            noise=noise,
             exposure=exposure,
             noise_seed=(self.options.seed << 32) | number,
-            threads=self._threads,
         )
+
+    @cached_property
+    def _wide_view(self) -> WideView | None:
+        """What puts an image together that is seen through a lens."""
+        seen_through = self.options.lens
+        return None if seen_through is None else WideView(seen_through.camera_model(*self._size))
+
+    def _side(
+        self, T_wc: FloatArray, seconds: float, R_sc: FloatArray, focal_length: float, size: int
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        """One side of the cube around a camera, without noise."""
+        T_cs = np.eye(4)
+        T_cs[:3, :3] = R_sc.T
+        middle = (size - 1) / 2
+        return self._composed(
+            T_wc @ T_cs,
+            seconds,
+            fx=focal_length,
+            fy=focal_length,
+            cx=middle,
+            cy=middle,
+            width=size,
+            height=size,
+            noise=0.0,
+            exposure=1.0,
+            noise_seed=0,
+        )
+
+    def _composed(
+        self, T_wc: FloatArray, seconds: float, **image: Any
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        """Render a pinhole image of the world and of what moves in it."""
+        grey, depth = self._rendered(self._built, T_wc, image)
+        for part, world in zip(self._scene.moving, self._built_parts, strict=True):
+            # A part that moves is one that stands still and a camera that moves the other way.
+            T_pc = T_wc.copy()
+            T_pc[:3, 3] -= part.shift(seconds)
+            grey_part, depth_part = self._rendered(world, T_pc, image)
+            before = (depth_part > 0) & ((depth == 0) | (depth_part < depth))
+            grey, depth = np.where(before, grey_part, grey), np.where(before, depth_part, depth)
+        return grey, depth
+
+    def _rendered(
+        self, world: core.World, T_wc: FloatArray, image: Mapping[str, Any]
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        grey, depth = core.render(world, inverse_poses(T_wc), **image, threads=self._threads)
         return grey, depth
 
     def _measured(self, depth: NDArray[np.float32], number: int) -> NDArray[np.uint16]:

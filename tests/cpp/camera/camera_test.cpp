@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/errors.hpp"
+#include "support/cameras.hpp"
 #include "support/npy.hpp"
 
 namespace orbslam {
@@ -57,33 +58,41 @@ std::pair<double, double> distort(const Pinhole& k, const Distortion& d, double 
           k.fy * (y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y) + k.cy};
 }
 
-TEST(Camera, UndistortionEqualsTheGoldenGridAndKeypointsBitByBit) {
+// The golden numbers come from five steps of a fixed point, which end up to 0.3 pixels from the
+// solution.
+constexpr float kFivePoorSteps = 0.4F;
+
+TEST(Camera, UndistortionIsNearTheGoldenGridAndKeypoints) {
   const Camera camera(golden_options());
   ASSERT_TRUE(camera.distorts());
   for (const auto& [raw, expected] : {std::pair("grid", "out_grid_un"), {"out_kp", "out_kpun"}}) {
-    EXPECT_EQ(undistorted(camera, golden(raw).values), golden(expected).values) << raw;
+    const auto ours = undistorted(camera, golden(raw).values);
+    const auto theirs = golden(expected).values;
+    ASSERT_EQ(ours.size(), theirs.size());
+    for (std::size_t i = 0; i < ours.size(); ++i) {
+      EXPECT_NEAR(ours[i], theirs[i], kFivePoorSteps) << raw << ' ' << i;
+    }
   }
 }
 
-TEST(Camera, BoundsEqualTheGoldenOnes) {
+TEST(Camera, BoundsAreNearTheGoldenOnes) {
   const ImageBounds bounds = Camera(golden_options()).bounds();
   const auto expected = golden("out_bounds").values;
-  EXPECT_EQ(bounds.min_x, expected[0]);
-  EXPECT_EQ(bounds.max_x, expected[1]);
-  EXPECT_EQ(bounds.min_y, expected[2]);
-  EXPECT_EQ(bounds.max_y, expected[3]);
+  EXPECT_NEAR(bounds.min_x, expected[0], kFivePoorSteps);
+  EXPECT_NEAR(bounds.max_x, expected[1], kFivePoorSteps);
+  EXPECT_NEAR(bounds.min_y, expected[2], kFivePoorSteps);
+  EXPECT_NEAR(bounds.max_y, expected[3], kFivePoorSteps);
 }
 
 TEST(Camera, DistortingAgainReturnsTheRawPixels) {
-  // Where keypoints can lie; five iterations leave more than this in the very corners.
   const CameraOptions options = golden_options();
   const Camera camera(options);
   for (int v = 16; v <= 464; v += 16) {
     for (int u = 16; u <= 624; u += 16) {
       const Eigen::Vector2f uv = camera.from_image(Eigen::Vector2i(u, v).cast<float>());
       const auto [x, y] = distort(options.pinhole, options.distortion, uv.x(), uv.y());
-      EXPECT_NEAR(x, u, 0.05);
-      EXPECT_NEAR(y, v, 0.05);
+      EXPECT_NEAR(x, u, 1e-4);
+      EXPECT_NEAR(y, v, 1e-4);
     }
   }
 }
@@ -135,21 +144,13 @@ TEST(Camera, ThroughTheLensIsByTheFormula) {
 // r / (1 + r^2) is at most 1/2: farther out the lens shows nothing.
 TEST(Camera, WhereARationalLensShowsNothingPixelsStay) {
   CameraOptions options = rectified_options();
-  options.pinhole = {400, 400, 320, 240};
+  options.pinhole = {700, 700, 320, 240};
   options.distortion[5] = 1;
   const Camera camera(options);
-  const Eigen::Vector2f raw(320 + 201, 240);
-  EXPECT_TRUE(camera.from_image(raw).isApprox(raw, 1e-6F));
-  EXPECT_NEAR(camera.from_image({320 + 199.0F, 240}).x(), 320 + 400 * 0.9048, 0.2);
-}
-
-TEST(Camera, ARationalLensWithoutItsDenominatorIsTheRadialOne) {
-  CameraOptions options = golden_options();
-  const auto grid = golden("grid").values;
-  const auto radial = undistorted(Camera(options), grid);
-  options.distortion[7] = 1e-15;  // not 0: Newton's method
-  const auto rational = undistorted(Camera(options), grid);
-  for (std::size_t i = 0; i < radial.size(); ++i) EXPECT_NEAR(radial[i], rational[i], 0.4);
+  const Eigen::Vector2f corner(639, 479);
+  EXPECT_TRUE(camera.from_image(corner).isApprox(corner, 1e-6F));
+  EXPECT_FALSE(camera.shows(corner.cast<double>()));
+  EXPECT_NEAR(camera.from_image({320 + 350.0F - 1, 240}).x(), 320 + 700 * 0.92711, 0.2);
 }
 
 TEST(Camera, RectifiedBoundsAreTheImageRectangle) {
@@ -211,7 +212,6 @@ TEST(Camera, PointsThatAreNotInFrontHaveNoPixel) {
     const Eigen::Vector3d point(0.3, -0.4, z);
     Eigen::Vector2d pixel(7, 8);
     Seen seen;
-    EXPECT_FALSE(camera.can_see(point));
     EXPECT_FALSE(camera.project(point, pixel));
     EXPECT_FALSE(camera.project(point, seen));
     EXPECT_EQ(pixel, Eigen::Vector2d(7, 8));
@@ -238,6 +238,79 @@ TEST(Camera, ASmallTurnMovesTheMiddleByPixelsPerRadian) {
   Eigen::Vector2d pixel;
   ASSERT_TRUE(camera.project({std::sin(1e-3), 0, std::cos(1e-3)}, pixel));
   EXPECT_NEAR(pixel.x() - 320, 1e-3 * camera.pixels_per_radian(), 1e-6);
+}
+
+// The same for each kind of image plane.
+class EachLens : public ::testing::TestWithParam<testing::TestLens> {
+ protected:
+  std::shared_ptr<const Camera> camera_ = testing::make_camera(GetParam(), 40);
+};
+
+TEST_P(EachLens, RaysAreProjectedToTheirPixels) {
+  for (int v = 20; v < 480; v += 40) {
+    for (int u = 20; u < 640; u += 40) {
+      const Eigen::Vector3d ray = camera_->ray(u, v);
+      Eigen::Vector2d pixel;
+      ASSERT_TRUE(camera_->project(3.7 * ray, pixel));
+      EXPECT_NEAR((pixel - Eigen::Vector2d(u, v)).norm(), 0, 1e-8) << u << ' ' << v;
+      if (ray.z() <= 0) continue;
+      const Eigen::Vector3d point = camera_->unproject(u, v, 2.5);
+      EXPECT_NEAR(point.z(), 2.5, 1e-12);
+      EXPECT_NEAR(point.cross(ray).norm(), 0, 1e-9);
+    }
+  }
+}
+
+TEST_P(EachLens, ASightGivesTheErrorInRawPixels) {
+  for (int v = 20; v < 480; v += 40) {
+    for (int u = 20; u < 640; u += 40) {
+      const Sight sight = camera_->sight(u, v);
+      const Eigen::Vector2d raw = camera_->to_image({u, v});
+      const Eigen::Vector3d ray = camera_->ray(u, v).normalized();
+      for (const double turn : {1e-5, 1e-3}) {
+        const Eigen::Vector3d p = 5 * (ray + turn * Eigen::Vector3d(0.6, -0.7, 0.2));
+        Eigen::Vector2d pixel, error;
+        ASSERT_TRUE(camera_->project(p, pixel));
+        ASSERT_TRUE(camera_->error(p, u, v, error));
+        const Eigen::Vector2d exact = camera_->to_image(pixel) - raw;
+        const Eigen::Vector3d q = sight * p;
+        EXPECT_GT(q.z(), 0);
+        // The rest is of second order.
+        EXPECT_NEAR((q.head<2>() / q.z() - exact).norm(), 0, 3e3 * turn * turn + 1e-9);
+        EXPECT_NEAR((error - exact).norm(), 0, 3e3 * turn * turn + 1e-9);
+      }
+    }
+  }
+}
+
+TEST_P(EachLens, TheRightErrorIsThatOfTheDisparityAsWell) {
+  const Eigen::Vector3d p(0.4, -0.2, 3);
+  Eigen::Vector2d pixel, error;
+  ASSERT_TRUE(camera_->project(p, pixel));
+  const double right_u = camera_->right_column(pixel.x(), 3);
+  ASSERT_TRUE(camera_->error(p, pixel.x(), pixel.y(), error));
+  EXPECT_NEAR(camera_->right_error(p, error, pixel.x(), right_u), 0, 1e-9);
+  EXPECT_NEAR(camera_->right_error(p, error, pixel.x(), right_u + 2), -2, 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lenses, EachLens, ::testing::ValuesIn(testing::kTestLenses));
+
+TEST(Camera, AFisheyeLensHasTheImageForItsPlane) {
+  const auto camera = testing::make_camera(testing::TestLens::fisheye);
+  EXPECT_FALSE(camera->is_flat());
+  EXPECT_FALSE(camera->distorts());
+  EXPECT_EQ(camera->from_image({1.5F, 2.5F}), Eigen::Vector2f(1.5F, 2.5F));
+  EXPECT_EQ(camera->bounds().max_x, 640.0F);
+  EXPECT_NEAR(camera->pixels_per_radian(), 230, 1e-9);
+  Eigen::Vector2d pixel;
+  EXPECT_TRUE(camera->project({5, 0, 0.1}, pixel)) << "nearly 90 degrees from the axis";
+}
+
+TEST(Camera, RefusesAModelOfAnotherImageSize) {
+  CameraOptions options = rectified_options();
+  options.model = std::make_shared<CameraModel>(
+      "double_sphere", std::vector<double>{200, 200, 300, 200, -0.2, 0.6}, ImageSize{600, 400});
+  EXPECT_THROW(Camera{options}, SettingsError);
 }
 
 struct WrongOption {

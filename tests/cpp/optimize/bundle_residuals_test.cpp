@@ -24,6 +24,7 @@ struct Scene {
   std::shared_ptr<const Camera> model = testing::make_camera({480, 500, 320, 240}, 40);
   BundleView view{Pose(), *model};
   BundleMeasurement measurement;
+  double v_px = 0;
 
   Scene(std::mt19937_64& random, bool has_depth, double huber) {
     Vector6d xi;
@@ -37,7 +38,8 @@ struct Scene {
     measurement.view = &view;
     measurement.point = point.data();
     measurement.u = u + uniform(random, -8, 8);
-    measurement.v = v + uniform(random, -8, 8);
+    v_px = v + uniform(random, -8, 8);
+    measurement.sight = model->sight(measurement.u, v_px);
     measurement.right_u = u - 40 / z + uniform(random, -8, 8);
     measurement.has_depth = has_depth;
     measurement.scale = uniform(random, 0.3, 1);
@@ -74,7 +76,7 @@ double huber_cost(const Scene& scene, double width) {
   const Eigen::Vector3d p =
       scene.view.T_cw() * Eigen::Map<const Eigen::Vector3d>(scene.point.data());
   const Eigen::Vector2d pixel = scene.model->pinhole().project(p);
-  double q = (Eigen::Vector2d(m.u, m.v) - pixel).squaredNorm();
+  double q = (Eigen::Vector2d(m.u, scene.v_px) - pixel).squaredNorm();
   if (m.has_depth) q += std::pow(m.right_u - (pixel.x() - scene.model->bf() / p.z()), 2);
   q *= m.scale * m.scale;
   return q <= width * width ? q : 2 * width * std::sqrt(q) - width * width;

@@ -105,7 +105,8 @@ TEST(Jacobians, BundleResiduals) {
   std::mt19937_64 random(1);
   for (const double size : kSizes) {
     for (int trial = 0; trial < kTrials; ++trial) {
-      const auto camera_model = testing::make_camera({480, 500, 320, 240}, 40);
+      const auto camera_model =
+          testing::make_camera(testing::kTestLenses[static_cast<std::size_t>(trial % 3)], 40);
       BundleView view(Pose::exp(random_vector(random, 6, 1)), *camera_model);
       const Blocks blocks = {random_vector(random, 6, size), Eigen::VectorXd(3)};
       view.move(blocks[0].data());
@@ -118,7 +119,7 @@ TEST(Jacobians, BundleResiduals) {
       m.view = &view;
       m.point = evaluated.data();
       m.u = u + uniform(random, -8, 8);
-      m.v = v + uniform(random, -8, 8);
+      m.sight = camera_model->sight(m.u, v + uniform(random, -8, 8));
       m.right_u = u - camera_model->bf() / z + uniform(random, -8, 8);
       m.has_depth = true;
       m.scale = uniform(random, 0.3, 1);

@@ -50,6 +50,8 @@ struct Seen {
             v.data(),
             right_u.data(),
             weight.data(),
+            false,
+            {},
             {1, 0, 0, 0, 1, 0, 0, 0, 1},
             {0, 0, 0},
             500,
@@ -57,6 +59,7 @@ struct Seen {
             320,
             240,
             40.0 / 500,
+            40,
             huber};
   }
   /// The sum of squares, one after the other.

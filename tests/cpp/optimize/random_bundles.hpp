@@ -14,9 +14,11 @@ namespace orbslam::testing {
 
 /// Cameras in a row that look at a box of points; poses and points are disturbed.
 inline BundleProblem random_bundle(std::uint64_t seed, std::size_t n_cameras, std::size_t n_points,
-                                   std::size_t n_fixed, bool with_depth) {
+                                   std::size_t n_fixed, bool with_depth,
+                                   TestLens lens = TestLens::none) {
   std::mt19937_64 random(seed);
-  const auto model = make_camera({500, 500, 320, 240}, 40);
+  const auto model =
+      lens == TestLens::none ? make_camera({500, 500, 320, 240}, 40) : make_camera(lens, 40);
   BundleProblem problem;
   std::vector<Pose> truth;
   for (std::size_t i = 0; i < n_cameras; ++i) {
@@ -33,7 +35,8 @@ inline BundleProblem random_bundle(std::uint64_t seed, std::size_t n_cameras, st
                                 uniform(random, 3, 9));
     for (std::size_t c = 0; c < n_cameras; ++c) {
       const Eigen::Vector3d p_c = truth[c] * point;
-      const Eigen::Vector2d pixel = model->pinhole().project(p_c);
+      Eigen::Vector2d pixel;
+      if (!model->project(p_c, pixel)) continue;
       BundleProblem::Observation o;
       o.camera = static_cast<std::uint32_t>(c);
       o.point = static_cast<std::uint32_t>(i);

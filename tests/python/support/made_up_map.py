@@ -244,6 +244,8 @@ def _camera(lens: tuple[float, ...] | None, bf: float) -> Cameras:
         height=np.array([HEIGHT]),
         scale_factor=np.array([SCALE_FACTOR], np.float32),
         n_levels=np.array([N_LEVELS]),
+        model=np.zeros(1, np.int64),
+        lens=np.zeros((1, 16)),
     )
 
 

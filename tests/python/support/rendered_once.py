@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
@@ -56,24 +56,19 @@ _kept = _Kept()
 
 
 def _rendered_once(
-    self: SyntheticSequence,
-    world: Any,
-    T_wc: FloatArray,
-    number: int,
-    exposure: float,
-    noise: float | None,
+    self: SyntheticSequence, world: Any, T_wc: FloatArray, image: Mapping[str, Any]
 ) -> tuple[Any, Any]:
-    options, camera = self.options, self.camera
+    options = self.options
     place = [*self._built_parts, self._built].index(world)  # which of the parts that move
-    noise = options.noise if noise is None else noise
+    # Without noise its seed does not matter.
+    matters = {name: image[name] for name in image if image["noise"] > 0 or name != "noise_seed"}
     key = (
         *(type(self), self._world, options.length, options.seed, place),
-        *(self._size, camera.fx, camera.fy, camera.cx, camera.cy),
-        *(T_wc.tobytes(), number if noise > 0 else None, exposure, noise),
+        *(T_wc.tobytes(), *matters.items()),
     )
     images = _kept.get(key)
     if images is None:
-        images = _RENDER(self, world, T_wc, number, exposure, noise)
+        images = _RENDER(self, world, T_wc, image)
         _kept.put(key, images)
     grey, depth = images
     return grey.copy(), depth.copy()  # a test may write into them

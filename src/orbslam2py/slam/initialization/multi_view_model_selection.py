@@ -262,7 +262,10 @@ class MultiViewModelSelection:
         little parallax that it would lie behind the first view is taken to be infinitely far.
         """
         points = placed.points
-        behind = points[:, 2] < 0
+        first = self._sightings[0]
+        rays = self._camera.rays(np.ascontiguousarray(first.pixels, np.float64))
+        behind = np.zeros(len(points), bool)
+        behind[first.rows] = np.sum(rays * points[first.rows], axis=1) < 0
         nowhere = np.all(points == 0, axis=1)
         costs = []
         for pose, seen in zip(placed.poses, self._sightings, strict=True):

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
-from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.image_motion import Pixels
 from orbslam2py.slam.initialization.initial_views import Indices, InitialViews, View
 
@@ -280,11 +279,8 @@ def squared_errors(
 ) -> FloatArray:
     """Squared distances (n,) of points (n, 3) from where they are seen, over the variance.
 
-    Infinite behind the camera.
+    Infinite where the camera cannot see a point.
     """
-    fx, fy, cx, cy = intrinsics(camera)
-    x, y, z = (T_cw @ np.ascontiguousarray(points)).T
-    ahead = z > 0
-    z = np.where(ahead, z, 1.0)
-    error = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1) - keypoints
-    return np.where(ahead, np.sum(error**2, axis=1) * inverse_sigma2, np.inf)
+    positions = np.ascontiguousarray(T_cw @ np.ascontiguousarray(points))
+    error = camera.errors(positions, np.ascontiguousarray(keypoints, np.float64))
+    return np.nan_to_num(np.sum(error**2, axis=1) * inverse_sigma2, nan=np.inf)
