@@ -277,6 +277,45 @@ class OrbExtractor:
         """
         The scale tables.
         """
+class CameraModel:
+    """
+    A central camera of any model, with raw pixels. Immutable.
+    """
+    def __init__(self, name: str, parameters: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Raises SettingsError that names model, parameter and remedy.
+        """
+    def angle_of_view(self) -> tuple[float, float, float]:
+        """
+        (horizontal, vertical, diagonal) [rad].
+        """
+    def pixels_per_radian(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pixels per radian (n,) float64 at pixels (n, 2), the geometric mean over all
+        directions; NaN where the model shows nothing.
+        """
+    def project(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN outside of the domain.
+        """
+    def project_with_jacobian(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Pixels (n, 2) and their derivatives (n, 2, 3) by the points (n, 3), float64; NaN
+        outside of the domain.
+        """
+    def unproject(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Unit rays (n, 3) float64 of pixels (n, 2); NaN where the model shows nothing.
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def parameter_names(self) -> list[str]:
+        ...
+    @property
+    def parameters(self) -> list[float]:
+        ...
 class Pinhole:
     """
     Pinhole intrinsics in pixels.
@@ -323,9 +362,10 @@ class CameraOptions:
     """
     What a Camera is made from.
     """
-    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, model: CameraModel = None) -> None:
         """
-        Nothing is checked before a Camera is made.
+        `model`: a CameraModel in place of fx, fy, cx, cy and distortion. Nothing is checked
+        before a Camera is made.
         """
     @property
     def bf(self) -> float:
@@ -402,25 +442,31 @@ class CameraOptions:
 class Camera:
     """
     A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual)
-    right camera. The plane has undistorted pixels; those of the image itself are called raw.
+    right camera. Of a pinhole the plane is flat, without the distortion of the lens; of a
+    fisheye lens it is the image itself. Pixels of the image are called raw.
     """
     def __init__(self, options: CameraOptions) -> None:
         """
         Raises SettingsError when an option is out of range.
         """
+    def errors(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Errors (n, 2) float64 [raw px] of the projections of points (n, 3) in the camera frame
+        against keypoints at pixels (n, 2) of the plane; NaN for those that are not visible.
+        """
     def from_image(self, raw: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
         """
-        Undistorted pixels (n, 2) float32 of raw pixels (n, 2).
+        Pixels (n, 2) float32 of the plane of raw pixels (n, 2).
         """
     def project(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Undistorted pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN for those
-        that are not in front of the camera. Bounds are not asked.
+        Pixels (n, 2) float64 of the plane of points (n, 3) in the camera frame; NaN for those
+        that are not visible. Bounds are not asked.
         """
     def rays(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Directions (n, 3) float64 in which undistorted pixels (n, 2) look, as points at depth
-        1 in the camera frame.
+        Directions (n, 3) float64 in which pixels (n, 2) of the plane look: points at depth 1
+        in the camera frame, for a fisheye lens unit vectors; NaN where it shows nothing.
         """
     def right_column(self, u: typing.SupportsFloat | typing.SupportsIndex, z: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
@@ -428,7 +474,7 @@ class Camera:
         """
     def to_image(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Raw pixels (n, 2) float64 of undistorted pixels (n, 2).
+        Raw pixels (n, 2) float64 of pixels (n, 2) of the plane.
         """
     @property
     def baseline(self) -> float:
@@ -457,6 +503,11 @@ class Camera:
         (width, height) [px].
         """
     @property
+    def is_flat(self) -> bool:
+        """
+        The image plane is that of a pinhole, not of a fisheye lens.
+        """
+    @property
     def is_rectified(self) -> bool:
         """
         True when the lens does not distort.
@@ -469,45 +520,6 @@ class Camera:
         """
         Pixels that the image moves in its middle per radian of turning.
         """
-class CameraModel:
-    """
-    A central camera of any model, with raw pixels. Immutable.
-    """
-    def __init__(self, name: str, parameters: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        Raises SettingsError that names model, parameter and remedy.
-        """
-    def angle_of_view(self) -> tuple[float, float, float]:
-        """
-        (horizontal, vertical, diagonal) [rad].
-        """
-    def pixels_per_radian(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Pixels per radian (n,) float64 at pixels (n, 2), the geometric mean over all
-        directions; NaN where the model shows nothing.
-        """
-    def project(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN outside of the domain.
-        """
-    def project_with_jacobian(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
-        """
-        Pixels (n, 2) and their derivatives (n, 2, 3) by the points (n, 3), float64; NaN
-        outside of the domain.
-        """
-    def unproject(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Unit rays (n, 3) float64 of pixels (n, 2); NaN where the model shows nothing.
-        """
-    @property
-    def name(self) -> str:
-        ...
-    @property
-    def parameter_names(self) -> list[str]:
-        ...
-    @property
-    def parameters(self) -> list[float]:
-        ...
 class Frame:
     """
     What one image (pair) says: features, depths, words. Arrays are copies; n keypoints.
