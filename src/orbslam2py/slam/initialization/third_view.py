@@ -283,4 +283,5 @@ def squared_errors(
     """
     positions = np.ascontiguousarray(T_cw @ np.ascontiguousarray(points))
     error = camera.errors(positions, np.ascontiguousarray(keypoints, np.float64))
-    return np.nan_to_num(np.sum(error**2, axis=1) * inverse_sigma2, nan=np.inf)
+    chi2 = np.sum(error**2, axis=1) * inverse_sigma2
+    return np.where(np.isnan(chi2), np.inf, chi2)
