@@ -85,11 +85,13 @@ def require_supported(where: str, lens: str, sensor: Sensor, alone: str = "") ->
     """
     if lens in _UNSUPPORTED:
         raise SettingsError(
-            f"{where} is {_UNSUPPORTED[lens]}, of a model that is not supported; {_remedy(lens)}"
+            f"{where} is {_UNSUPPORTED[lens]}, which is not supported; {_remedy(lens)}"
         )
     if lens != PINHOLE and sensor is Sensor.STEREO:
         pair = no_fisheye_pair(alone) if alone else no_fisheye_pair()
-        raise SettingsError(f"{where} is a fisheye camera ({lens}), and {pair}")
+        raise SettingsError(
+            f"{where} is a fisheye camera ({lens}), and {pair}:\n    {new_line(sensor)}"
+        )
 
 
 def _remedy(lens: str) -> str:

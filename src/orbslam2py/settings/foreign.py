@@ -87,6 +87,12 @@ def _line(*patterns: str) -> Callable[[CalibrationText], bool]:
     return lambda content: all(one.search(content.text) for one in found)
 
 
+def _is_opencv(content: CalibrationText) -> bool:
+    """Settings of ORB-SLAM hold matrices of OpenCV as well."""
+    found = re.search(r"opencv-(?:nd-)?matrix|<opencv_storage>", content.text)
+    return bool(found) and not _line(r"^Camera1?\.fx\s*:")(content)
+
+
 def _is_opencv_pair(content: CalibrationText) -> bool:
     return bool(re.search(r"\b(?:[MK]2|[KM]R|\w*[mM]atrix_?[2R]|\w*right\w*)\b", content.text))
 
@@ -150,7 +156,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "a calibration of OpenCV",
         "OpenCV's FileStorage (YAML or XML), its calibration samples",
         "One camera, or the pair of M1, D1, M2, D2, R, T with its rectification.",
-        _line(r"opencv-(?:nd-)?matrix|<opencv_storage>"),
+        _is_opencv,
         "camera_matrix: !!opencv-matrix",
     ),
     ForeignFormat(

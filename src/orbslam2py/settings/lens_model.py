@@ -179,12 +179,12 @@ def take_lens(document: Document, lens: FileLens) -> dict[str, Any]:
         if name not in names and _value(entry) != 0:
             text = (
                 f"{entry.key} is {entry.value}, and the lens of {lens.named} has {listed} alone; "
-                f"remove {entry.key}, or name the right model"
+                "name the model to which all coefficients belong"
             )
             document.problems.append(Problem(entry.line, text))
     lacking = [f"Camera.{name}" for name in names if name not in given]
     if lacking:
-        text = f"{', '.join(lacking)}: not in the file; the lens of {lens.named} needs {listed}"
+        text = f"{lens.named} needs {listed}; add {', '.join(lacking)}"
         document.problems.append(Problem(line, text))
     numbers = []
     for name in names:
