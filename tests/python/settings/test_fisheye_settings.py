@@ -181,7 +181,7 @@ def test_no_pair() -> None:
 
 # ---- projection ----------------------------------------------------------------------------------
 def test_points_are_where_opencv_projects_them() -> None:
-    points = np.random.default_rng(0).uniform(-1, 1, (50, 3)) + [0, 0, 1.5]
+    points = np.random.default_rng(0).uniform((-1, -1, 0.5), (1, 1, 2.5), (50, 3))
     T_cw = np.eye(4)
     T_cw[:3, :3] = cv2.Rodrigues(np.array([0.1, -0.2, 0.05]))[0]
     T_cw[:3, 3] = [0.1, 0.2, 0.3]
@@ -215,7 +215,7 @@ def test_the_model_of_a_pinhole(lens: dict[str, float], model: str) -> None:
     found = camera.camera_model(640, 480)
     assert found.name == model
     assert found.image_size == (640, 480)
-    points = np.random.default_rng(1).uniform(-0.4, 0.4, (20, 3)) + [0, 0, 1]
+    points = np.random.default_rng(1).uniform((-0.4, -0.4, 1), (0.4, 0.4, 1.4), (20, 3))
     np.testing.assert_allclose(found.project(points), camera.project(points), atol=1e-9)
 
 
