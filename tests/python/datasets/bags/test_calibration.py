@@ -87,7 +87,11 @@ def test_one_camera(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize(
     ("D", "expected"),
-    [((0.02, -0.01, 0.004, -0.001), True), ((0.02, -0.01, 0.004, -0.001, 0.0), True), (D, False)],
+    [
+        ((0.02, -0.01, 0.004, -0.001), True),
+        ((0.02, -0.01, 0.004, -0.001, 0.0), True),
+        ((0.02, -0.01, 0.004, 0.1, 0.1), False),
+    ],
 )
 def test_one_fisheye_camera(tmp_path: Path, D: tuple[float, ...], expected: bool) -> None:
     info = {**raw_pair()["left"], "model": "equidistant", "D": D}
