@@ -57,14 +57,17 @@ def _calibrations() -> str:
     return (
         "## Calibrations\n\n`orbslam2py import-camera FILE --output my.yaml` recognises the format "
         "by the content of the file. Lenses: pinhole, radial-tangential with 4 or 5 coefficients, "
-        "rational with 8. Fisheye lenses are refused with the reason.\n\n" + _table(head, rows)
+        "rational with 8. Fisheye lenses of one camera: Kannala-Brandt (equidistant), double "
+        "sphere, EUCM, Mei, FOV. Other lenses and fisheye pairs are refused with the reason.\n\n"
+        + _table(head, rows)
     )
 
 
 def _settings() -> str:
     return (
         "## Settings\n\n`--settings FILE` takes the files of ORB-SLAM2, of ORB-SLAM3 (0.x and 1.0) "
-        "and of stella_vslam as they are, for pinhole cameras: [Settings](settings.md)."
+        "and of stella_vslam as they are, for pinhole cameras and single fisheye cameras: "
+        "[Settings](settings.md)."
     )
 
 

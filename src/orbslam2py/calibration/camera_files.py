@@ -13,7 +13,7 @@ from orbslam2py.calibration.camera_model import camera_settings
 from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile, ForeignCamera
 from orbslam2py.calibration.foreign_pairs import Pair, pair_settings
 from orbslam2py.calibration.formats import READERS
-from orbslam2py.calibration.lenses import require_pinhole
+from orbslam2py.calibration.lenses import UNIFIED, require_supported
 from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
@@ -282,11 +282,18 @@ def _settings_of(
 ) -> Settings:
     if isinstance(chosen, Pair):
         for one in (chosen.left, chosen.right):
-            require_pinhole(f"{what}: {_called(file, one)}", one.lens, Sensor.STEREO)
+            where = f"{what}: {_called(file, one)}"
+            require_supported(where, one.lens, Sensor.STEREO, chosen.alone)
         return pair_settings(chosen, fps)
-    require_pinhole(f"{what}: {_called(file, chosen)}", chosen.lens, sensor or Sensor.MONOCULAR)
+    where = f"{what}: {_called(file, chosen)}"
+    require_supported(where, chosen.lens, sensor or Sensor.MONOCULAR)
     assert chosen.K is not None
-    camera = camera_settings(chosen.K, chosen.distortion, chosen.size, fps=fps, rgb=file.rgb)
+    model, lens = chosen.lens, chosen.lens_numbers
+    if model == UNIFIED:
+        model, lens = "eucm", (*lens, 1.0)
+    camera = camera_settings(
+        chosen.K, chosen.distortion, chosen.size, fps=fps, rgb=file.rgb, model=model, lens=lens
+    )
     return settings_for_camera(camera, Sensor.MONOCULAR)
 
 

@@ -12,6 +12,7 @@ from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.settings.fisheye import PINHOLE
 from orbslam2py.settings.foreign import filled_line
 from orbslam2py.settings.groups import DISTORTION_FIELDS
 from orbslam2py.settings.keys import focal_problems
@@ -24,8 +25,13 @@ def camera_settings(
     *,
     fps: float,
     rgb: bool = False,
+    model: str = PINHOLE,
+    lens: tuple[float, ...] = (),
 ) -> CameraSettings:
-    """Camera settings of a matrix (3, 3) [pixels], up to eight coefficients, width and height."""
+    """Camera settings of a matrix (3, 3) [pixels], up to eight coefficients, width and height.
+
+    `model` and `lens` are as in `orbslam2py.CameraSettings`.
+    """
     width, height = size or (None, None)
     return CameraSettings(
         fx=K[0, 0],
@@ -37,6 +43,8 @@ def camera_settings(
         height=height,
         fps=fps,
         rgb=rgb,
+        model=model,
+        lens=lens,
     )
 
 
@@ -133,6 +141,26 @@ def opencv_coefficients(
     all_of_them = np.zeros(8)
     all_of_them[: min(given.size, 8)] = given[:8]
     return all_of_them if np.any(all_of_them[5:]) else all_of_them[:5]
+
+
+def kannala_brandt_numbers(path: object, where: str, value: object) -> tuple[float, ...]:
+    """Take k1, k2, k3, k4 of an equidistant (Kannala-Brandt) lens.
+
+    Some programs write more numbers, which are 0.
+
+    Raises
+    ------
+    SettingsError
+        If there are fewer than four numbers, or one after them is not 0.
+    """
+    given = checked_numbers(path, where, value, ())
+    if given.size < 4 or np.any(given[4:]):
+        raise SettingsError(
+            f"{path}: {where} must hold the 4 numbers k1, k2, k3, k4 of a fisheye lens "
+            f"(equidistant, Kannala-Brandt), found {repr(value)[:200]}; give these, or name the "
+            "right lens"
+        )
+    return tuple(given[:4].tolist())
 
 
 def pinhole_matrix(path: object, where: str, values: object) -> FloatArray:

@@ -31,13 +31,15 @@ class ForeignCamera:
         What ``--camera`` calls it.
     K
         Camera matrix (3, 3), pixels; the centre of the top-left pixel is (0, 0). None for a lens
-        that has none.
+        that is not supported.
     distortion
         OpenCV's k1, k2, p1, p2, k3, (5,), or with k4, k5, k6, (8,). Other lenses: all 0.
     size
         Width and height [pixels]; None if the file does not tell.
     lens
         As `orbslam2py.calibration.lenses.lens_of` returns it.
+    lens_numbers
+        Parameters of a fisheye lens after fx, fy, cx, cy, as `orbslam2py.CameraModel` orders them.
     T_camera_rig
         Where it stands: from coordinates that all cameras of the file share (of the first one, or
         of the IMU) to those of the camera, (4, 4), metres. None if the file does not tell.
@@ -55,6 +57,7 @@ class ForeignCamera:
     T_camera_rig: FloatArray | None = None
     R: FloatArray | None = None
     P: FloatArray | None = None
+    lens_numbers: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

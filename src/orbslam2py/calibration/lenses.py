@@ -3,34 +3,21 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
+from orbslam2py.settings.fisheye import PINHOLE, fisheye_model, no_fisheye_pair, plain_name
 from orbslam2py.settings.foreign import new_line
 
-PINHOLE = "pinhole"
+__all__ = ["PINHOLE", "UNIFIED", "lens_of", "require_supported"]
 
+#: The unified model with alpha alone: the extended one with beta 1.
+UNIFIED = "ucm"
 
-@dataclass(frozen=True)
-class _Lens:
-    """A lens that is not supported: what it is, and whether OpenCV undistorts its images."""
-
-    noun: str
-    in_opencv: bool = False
-
-
-_FISHEYE = {
-    "equidistant": _Lens("a fisheye camera (equidistant, also called Kannala-Brandt)", True),
-    "double sphere": _Lens("a fisheye camera (double sphere model)"),
-    "eucm": _Lens("a fisheye camera (extended unified model, EUCM)"),
-    "omni": _Lens("an omnidirectional camera (unified model of Mei)"),
-    "fov": _Lens("a fisheye camera (field-of-view model)"),
-    "scaramuzza": _Lens("an omnidirectional camera (polynomial model of Scaramuzza)"),
-    "thin prism": _Lens("a fisheye camera (equidistant with a thin prism)"),
-    "equirectangular": _Lens("a panorama (equirectangular)"),
-    "polynomial": _Lens("a fisheye camera (a polynomial of the angle)"),
+_UNSUPPORTED = {
+    "scaramuzza": "an omnidirectional camera (polynomial model of Scaramuzza)",
+    "thin prism": "a fisheye camera (equidistant with a thin prism)",
+    "equirectangular": "a panorama (equirectangular)",
+    "polynomial": "a fisheye camera (a polynomial of the angle)",
 }
 
 #: Names without signs between words, in lower case.
@@ -40,18 +27,13 @@ _NAMES = {
         "simplepinhole simpleradial radial perspective brownconrady pinholeradtan "
         "pinholeradtan8 pinholefull distortionnone distortionbrownconrady"
     ),
-    "equidistant": (
-        "equidistant equi fisheye opencvfisheye kannalabrandt kannalabrandt4 kannalabrandt8 kb kb4 "
-        "kb8 radialfisheye simpleradialfisheye fisheye624 distortionkannalabrandt4"
-    ),
-    "double sphere": "ds doublesphere",
-    "eucm": "eucm",
-    "omni": "omni mei ucm unified omnidirectional",
-    "fov": "fov atan distortionftheta ftheta",
+    # COLMAP's, whose coefficients are the first ones of Kannala-Brandt.
+    "kannala_brandt": "radialfisheye simpleradialfisheye simplefisheye",
+    UNIFIED: "ucm unified",
     "scaramuzza": "scaramuzza ocam ocamcalib",
-    "thin prism": "thinprismfisheye radtanthinprismfisheye",
+    "thin prism": "thinprismfisheye radtanthinprismfisheye fisheye624",
     "equirectangular": "equirectangular panorama spherical",
-    "polynomial": "radialpoly polynomial",
+    "polynomial": "radialpoly polynomial distortionftheta ftheta",
 }
 _LENSES = {name: lens for lens, names in _NAMES.items() for name in names.split()}
 
@@ -69,14 +51,15 @@ def lens_of(where: str, what: str, name: object) -> str:
     Returns
     -------
     str
-        `PINHOLE`, or a lens that `require_pinhole` refuses.
+        `PINHOLE`, a fisheye model of `orbslam2py.settings.fisheye.LENS_PARAMETERS`, `UNIFIED`, or a
+        lens that `require_supported` refuses.
 
     Raises
     ------
     SettingsError
         If nobody knows such a lens.
     """
-    lens = _LENSES.get(re.sub(r"[^a-z0-9]", "", str(name).lower()))
+    lens = fisheye_model(name) or _LENSES.get(plain_name(name))
     if lens is None:
         raise SettingsError(
             f"{where}: {what} {name} is not known; undistort the images with the program that "
@@ -86,7 +69,7 @@ def lens_of(where: str, what: str, name: object) -> str:
     return lens
 
 
-def require_pinhole(where: str, lens: str, sensor: Sensor) -> None:
+def require_supported(where: str, lens: str, sensor: Sensor, alone: str = "") -> None:
     """Raise `SettingsError` unless a lens is supported; it says what to do instead.
 
     Parameters
@@ -97,29 +80,26 @@ def require_pinhole(where: str, lens: str, sensor: Sensor) -> None:
         As `lens_of` returns it.
     sensor
         What settings are wanted for.
+    alone
+        How to take one camera of the file, for the message about a pair.
     """
-    if lens == PINHOLE:
-        return
-    kind = _FISHEYE[lens]
-    raise SettingsError(
-        f"{where} is {kind.noun}, and only pinhole cameras are supported; {_remedy(lens, sensor)}"
-    )
+    if lens in _UNSUPPORTED:
+        raise SettingsError(
+            f"{where} is {_UNSUPPORTED[lens]}, which is not supported; {_remedy(lens)}"
+        )
+    if lens != PINHOLE and sensor is Sensor.STEREO:
+        pair = no_fisheye_pair(alone) if alone else no_fisheye_pair()
+        raise SettingsError(
+            f"{where} is a fisheye camera ({lens}), and {pair}:\n    {new_line(sensor)}"
+        )
 
 
-def _remedy(lens: str, sensor: Sensor) -> str:
-    line = f"make settings of the new camera matrix:\n    {new_line(sensor)}"
-    if _FISHEYE[lens].in_opencv:
-        calls = "undistort the images with OpenCV (cv2.fisheye.undistortImage with K and D of"
-        if sensor is Sensor.STEREO:
-            calls = (
-                "undistort and rectify the images with OpenCV (cv2.fisheye.stereoRectify and "
-                "cv2.fisheye.initUndistortRectifyMap with K and D of"
-            )
-        return f"{calls} this file), and {line}"
+def _remedy(lens: str) -> str:
     if lens == "equirectangular":
+        line = f"make settings of the new camera matrix:\n    {new_line(Sensor.MONOCULAR)}"
         return f"cut a pinhole view out of the panorama, and {line}"
     return (
-        "calibrate the camera with the equidistant model (Kalibr: pinhole-equi), for which OpenCV "
-        "undistorts the images (cv2.fisheye.undistortImage), or, if it sees less than about 110 "
-        "degrees, as a pinhole camera with orbslam2py calibrate"
+        "calibrate the camera with a supported fisheye model (Kalibr: pinhole-equi, ds-none, "
+        "eucm-none, omni-radtan or pinhole-fov), or, if it sees less than about 110 degrees, as a "
+        "pinhole camera with orbslam2py calibrate"
     )

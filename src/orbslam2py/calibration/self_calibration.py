@@ -110,8 +110,10 @@ def calibration_gains(
     Returns
     -------
     CalibrationGains or None
-        None if no pair was left.
+        None if no pair was left, and for a fisheye camera, which is not judged.
     """
+    if camera.is_fisheye:
+        return None
     kept = [pair for pair in map(_with_depth, pairs) if len(pair.first) >= least]
     if not kept:
         return None

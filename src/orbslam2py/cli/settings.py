@@ -30,6 +30,7 @@ from orbslam2py.settings import (
 from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors
 from orbslam2py.settings.check import read_choice, warn_of_doubts
 from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, PINHOLE, checked_model
 from orbslam2py.settings.groups import DISTORTION_FIELDS
 
 app = typer.Typer(
@@ -65,6 +66,19 @@ def new(
             help="OpenCV's k1,k2,p1,p2, with k3, or with k3,k4,k5,k6 [none].", metavar="NUMBERS"
         ),
     ] = None,
+    model: Annotated[
+        str,
+        typer.Option(
+            help="Camera model: pinhole, kannala_brandt, double_sphere, eucm, mei or fov."
+        ),
+    ] = PINHOLE,
+    lens: Annotated[
+        str | None,
+        typer.Option(
+            help="Parameters of a fisheye model, such as k1,k2,k3,k4 of kannala_brandt [none].",
+            metavar="NUMBERS",
+        ),
+    ] = None,
     features: Annotated[
         int | None,
         typer.Option(help="ORB features per image [1000, or 2000 above 0.6 megapixels]."),
@@ -78,7 +92,7 @@ def new(
     width, height = (None, None) if size is None else parse_size(size)
     camera = CameraSettings(fx, fy, cx, cy, width=width, height=height, fps=fps, rgb=rgb)
     settings = settings_for_camera(
-        replace(camera, **_coefficients(distortion)),
+        replace(camera, **_coefficients(distortion), **_lens(model, lens, distortion)),
         sensor,
         baseline=baseline,
         depth_factor=depth_factor,
@@ -144,6 +158,33 @@ def _coefficients(text: str | None) -> dict[str, Any]:
             "k1,k2,p1,p2[,k3[,k4,k5,k6]] like 0.1,-0.2,0,0"
         )
     return dict(zip(DISTORTION_FIELDS, numbers, strict=False))
+
+
+def _lens(model: str, text: str | None, distortion: str | None) -> dict[str, Any]:
+    """The fields of `CameraSettings` for a fisheye lens; empty for a pinhole."""
+    model = checked_model(model)
+    names = ",".join(LENS_PARAMETERS.get(model, ()))
+    if model == PINHOLE:
+        if text is None:
+            return {}
+        raise SettingsError(
+            "--lens goes with a fisheye model; name it with --model "
+            f"({', '.join(LENS_PARAMETERS)}), or give --distortion for a pinhole"
+        )
+    if distortion is not None:
+        raise SettingsError(
+            f"--distortion goes with a pinhole, and --model is {model}; give --lens {names} instead"
+        )
+    try:
+        numbers = [float(word) for word in (text or "").replace(",", " ").split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != len(LENS_PARAMETERS[model]):
+        raise SettingsError(
+            f"--lens is {'missing' if text is None else repr(text)}; the model {model} needs the "
+            f"numbers --lens {names}"
+        )
+    return {"model": model, "lens": tuple(numbers)}
 
 
 def _describe(console: Console, settings: Settings) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from orbslam2py._arguments import cannot_open
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.rectification import rectification_of_pair
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import (
     CameraSettings,
     OrbSettings,
@@ -19,6 +20,8 @@ from orbslam2py.settings import (
     Settings,
     builtin_settings,
 )
+from orbslam2py.settings.fisheye import no_fisheye_pair
+from orbslam2py.settings.groups import DISTORTION_FIELDS
 from orbslam2py.settings.keys import focal_problems
 from orbslam2py.settings.opencv_yaml import Entry, parse_number, read_matrix, scan
 from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
@@ -37,11 +40,13 @@ class SensorCalibration:
     intrinsics
         fx, fy, cx, cy in pixels, (4,).
     distortion
-        k1, k2, p1, p2, (4,).
+        k1, k2, p1, p2, (4,); of a fisheye k1, k2, k3, k4.
     size
         Width and height in pixels.
     rate
         Images per second.
+    is_fisheye
+        Whether the lens is equidistant (Kannala-Brandt), as TUM-VI's.
     """
 
     path: Path
@@ -50,6 +55,7 @@ class SensorCalibration:
     distortion: FloatArray
     size: tuple[int, int]
     rate: float
+    is_fisheye: bool = False
 
     @property
     def T_BS(self) -> FloatArray:
@@ -75,7 +81,7 @@ class SensorCalibration:
 
 
 def read_sensor_yaml(path: Path) -> SensorCalibration:
-    """Read the calibration of a pinhole camera.
+    """Read the calibration of a pinhole camera, or of an equidistant fisheye.
 
     Parameters
     ----------
@@ -104,10 +110,13 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
     missing = [key for key in keys if key not in entries]
     if missing:
         raise DatasetError(f"{path} has no {', '.join(missing)}")
-    for key, allowed in (("camera_model", "pinhole"), ("distortion_model", "radial-tangential")):
-        if key in entries and entries[key].value != allowed:
-            entry = entries[key]
-            raise DatasetError(f"{path}:{entry.line}: {key} is {entry.value}; allowed: {allowed}")
+    for key, allowed in (
+        ("camera_model", ("pinhole",)),
+        ("distortion_model", ("radial-tangential", "equidistant")),
+    ):
+        if key in entries and entries[key].value not in allowed:
+            entry, names = entries[key], " or ".join(allowed)
+            raise DatasetError(f"{path}:{entry.line}: {key} is {entry.value}; allowed: {names}")
     intrinsics = _numbers(path, entries["intrinsics"], 4)
     for problem in focal_problems("intrinsics", np.diag(intrinsics[:2])):
         raise DatasetError(f"{path}:{entries['intrinsics'].line}: {problem}")
@@ -120,13 +129,17 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
         distortion=_numbers(path, entries["distortion_coefficients"], 4),
         size=(int(width), int(height)),
         rate=float(rate),
+        is_fisheye="distortion_model" in entries
+        and entries["distortion_model"].value == "equidistant",
     )
 
 
 def monocular_settings(camera: SensorCalibration) -> Settings:
     """Make settings for the raw images of one camera."""
     fx, fy, cx, cy = camera.intrinsics.tolist()
-    k1, k2, p1, p2 = camera.distortion.tolist()
+    lens: dict[str, Any] = dict(zip(DISTORTION_FIELDS, camera.distortion.tolist(), strict=False))
+    if camera.is_fisheye:
+        lens = {"model": "kannala_brandt", "lens": tuple(camera.distortion.tolist())}
     return Settings(
         sensor=Sensor.MONOCULAR,
         camera=CameraSettings(
@@ -134,10 +147,7 @@ def monocular_settings(camera: SensorCalibration) -> Settings:
             fy=fy,
             cx=cx,
             cy=cy,
-            k1=k1,
-            k2=k2,
-            p1=p1,
-            p2=p2,
+            **lens,
             width=camera.size[0],
             height=camera.size[1],
             fps=camera.rate,
@@ -148,7 +158,15 @@ def monocular_settings(camera: SensorCalibration) -> Settings:
 
 
 def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settings:
-    """Make settings for the pair, with the rectification that makes its images fit them."""
+    """Make settings for the pair, with the rectification that makes its images fit them.
+
+    Raises
+    ------
+    SettingsError
+        If it is a pair of fisheye cameras, or cannot be rectified.
+    """
+    if left.is_fisheye or right.is_fisheye:
+        raise SettingsError(no_fisheye_pair())
     rectification = rectification_of_pair(
         (left.camera_matrix, right.camera_matrix),
         (left.distortion, right.distortion),

@@ -169,6 +169,7 @@ class RerunRecorder:
         if settings is not None:
             camera = settings.camera
             known = camera.width is not None and camera.height is not None
+            # Rerun has pinholes only: of a fisheye the frustum shows the direction, not the view.
             stream.log(
                 "world/camera/image",
                 rr.Pinhole(

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
@@ -106,6 +108,13 @@ def calibration_distance(
     """
     u, v = np.meshgrid(np.linspace(0, size[0] - 1, 12), np.linspace(0, size[1] - 1, 9))
     pixels = np.stack([u.ravel(), v.ravel()], axis=1)
+    if one.is_fisheye or other.is_fisheye:
+        rays = other.camera_model(*size).unproject(pixels)
+        shown = ~np.isnan(rays[:, 0])
+        apart = one.project(rays[shown]) - pixels[shown]
+        # Directions that only one of them shows are infinitely far apart.
+        distances = np.nan_to_num(np.hypot(apart[:, 0], apart[:, 1]), nan=math.inf, posinf=math.inf)
+        return float(np.median(distances)) if len(distances) else math.inf
     plane = (pixels - (other.cx, other.cy)) / (other.fx, other.fy)
     apart = _project(one, plane) - _project(other, plane)
     return float(np.median(np.hypot(apart[:, 0], apart[:, 1])))
@@ -118,4 +127,6 @@ def _project(camera: CameraSettings, plane: FloatArray) -> FloatArray:
 
 def _numbers(camera: CameraSettings) -> str:
     text = f"fx {camera.fx:.4g}, fy {camera.fy:.4g}, cx {camera.cx:.4g}, cy {camera.cy:.4g}"
+    if camera.is_fisheye:
+        return f"{text}, {camera.model} {', '.join(f'{value:.3g}' for value in camera.lens)}"
     return f"{text}, k1 {camera.k1:.3g}" if camera.is_distorted else text

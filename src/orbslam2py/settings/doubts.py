@@ -39,7 +39,10 @@ def find_doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
     if sensor is Sensor.STEREO and camera.is_distorted:
         found.append("stereo input must be rectified; distortion must be zero")
     size = camera.width, camera.height
-    found += _doubts_of_lens("Camera", camera.matrix, camera.distortion, size)
+    if camera.is_fisheye:
+        found += _doubts_of_fisheye(camera, size)
+    else:
+        found += _doubts_of_lens("Camera", camera.matrix, camera.distortion, size)
     if sensor.has_depth:
         found += _doubts_of_depth(camera, groups["depth"])
     return found + _doubts_of_rectification(groups)
@@ -112,6 +115,29 @@ def _doubts_of_lens(
             "into the corners"
         )
     return found
+
+
+def _doubts_of_fisheye(camera: CameraSettings, size: tuple[int | None, int | None]) -> list[str]:
+    """Judge a fisheye lens by the part of the image that its model reaches.
+
+    The corners of a fisheye image may be dark, and its left and right border as well: half of the
+    distance to the nearest border must show something.
+    """
+    width, height = (
+        max(1, round(one or 2 * c)) for one, c in zip(size, (camera.cx, camera.cy), strict=True)
+    )
+    nearest = min(camera.cx, camera.cy, width - 1 - camera.cx, height - 1 - camera.cy)
+    if nearest <= 0:
+        return []  # the principal point is doubted
+    ends = np.array([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])
+    pixels = (camera.cx, camera.cy) + ends * nearest / 2
+    if np.isfinite(camera.camera_model(width, height).unproject(pixels)).all():
+        return []
+    return [
+        f"Camera: the {camera.model} lens shows nothing {nearest / 2:.0f} pixels from the "
+        f"principal point, though the nearest border of the image is {nearest:.0f} pixels from "
+        "it; check order, signs and image size of the lens parameters"
+    ]
 
 
 def _fold_of(D: FloatArray) -> float:

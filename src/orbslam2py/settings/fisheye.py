@@ -33,13 +33,6 @@ TYPES = {
     "fov": "FOV",
 }
 
-#: What is said of fisheye cameras for stereo.
-NO_FISHEYE_PAIR = (
-    "a stereo pair of fisheye cameras is not supported yet; use one of its cameras alone "
-    "(--sensor mono), or undistort and rectify the pair first (cv2.fisheye.stereoRectify, "
-    "cv2.fisheye.initUndistortRectifyMap) and make settings of the rectified cameras"
-)
-
 #: Names of other programs, without signs between words, in lower case.
 _NAMES = {
     "kannala_brandt": (
@@ -52,6 +45,15 @@ _NAMES = {
     "fov": "fov pinholefov atan",
 }
 _MODELS = {name: model for model, names in _NAMES.items() for name in names.split()}
+
+
+def no_fisheye_pair(alone: str = "use one of its cameras alone (--sensor mono)") -> str:
+    """Say that a fisheye pair is not supported, and what is; `alone` is how to take one camera."""
+    return (
+        f"a stereo pair of fisheye cameras is not supported yet; {alone}, or undistort and rectify "
+        "the pair first (cv2.fisheye.stereoRectify, cv2.fisheye.initUndistortRectifyMap) and make "
+        "settings of the rectified cameras"
+    )
 
 
 def plain_name(name: object) -> str:

@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import BUILTIN_DATA, BUILTIN_NAMES, builtin_sensors
 from orbslam2py.settings.groups import CameraSettings
 from orbslam2py.settings.settings import Settings, builtin_settings
@@ -33,6 +34,8 @@ class FitThresholds:
     """Horizontal field of view, degrees ..."""
     most_field_of_view: float = 150.0
     """... that a pinhole camera can have."""
+    most_fisheye_view: float = 280.0
+    """Horizontal field of view, degrees, that a fisheye camera can have."""
     focal_ratio: float = 1.5
     """Most fx by fy, or fy by fx."""
     scaled: float = 1.5
@@ -141,6 +144,8 @@ def _known_cameras() -> tuple[tuple[str, CameraSettings], ...]:
 
 def known_camera(camera: CameraSettings, thresholds: FitThresholds | None = None) -> str | None:
     """Name the built-in settings that have these numbers (fx, fy, cx, cy); None if none has."""
+    if camera.is_fisheye:
+        return None
     limit = (thresholds or FitThresholds()).known
     numbers = _intrinsics(camera)
     for name, known in _known_cameras():
@@ -265,14 +270,26 @@ def _off_the_middle(
 
 
 def _field(camera: CameraSettings, size: tuple[int, int], limits: FitThresholds) -> Misfit | None:
-    degrees = math.degrees(2 * math.atan(size[0] / (2 * camera.fx)))
-    if limits.least_field_of_view <= degrees <= limits.most_field_of_view:
+    most = limits.most_fisheye_view if camera.is_fisheye else limits.most_field_of_view
+    try:
+        degrees = _degrees_wide(camera, size)
+    except SettingsError as error:
+        cause = "a focal length in another unit, or of another image size"
+        return Misfit(str(error), cause, MEASURE)
+    if limits.least_field_of_view <= degrees <= most:
         return None
     return Misfit(
         f"fx {camera.fx:g} makes images of width {size[0]} {degrees:.0f} degrees wide",
         "a focal length in another unit (millimetres, image widths) or of another image size",
         f"give fx and fy in pixels, usually {size[0] * 0.5:.0f} to {size[0] * 1.5:.0f} here",
     )
+
+
+def _degrees_wide(camera: CameraSettings, size: tuple[int, int]) -> float:
+    """Horizontal angle of view, degrees; of a pinhole without its distortion."""
+    if camera.is_fisheye:
+        return math.degrees(camera.camera_model(*size).angle_of_view().horizontal)
+    return math.degrees(2 * math.atan(size[0] / (2 * camera.fx)))
 
 
 def _ratio(camera: CameraSettings, size: tuple[int, int], limits: FitThresholds) -> Misfit | None:

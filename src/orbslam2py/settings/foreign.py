@@ -87,6 +87,12 @@ def _line(*patterns: str) -> Callable[[CalibrationText], bool]:
     return lambda content: all(one.search(content.text) for one in found)
 
 
+def _is_opencv(content: CalibrationText) -> bool:
+    """Settings of ORB-SLAM hold matrices of OpenCV as well."""
+    found = re.search(r"opencv-(?:nd-)?matrix|<opencv_storage>", content.text)
+    return bool(found) and not _line(r"^Camera1?\.fx\s*:")(content)
+
+
 def _is_opencv_pair(content: CalibrationText) -> bool:
     return bool(re.search(r"\b(?:[MK]2|[KM]R|\w*[mM]atrix_?[2R]|\w*right\w*)\b", content.text))
 
@@ -132,7 +138,8 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "kalibr",
         "a camchain of Kalibr",
         "Kalibr",
-        "One camera, or the pair of the first two with its rectification.",
+        "One camera, or the pair of the first two with its rectification. Fisheyes (one camera): "
+        "pinhole-equi, pinhole-fov, ds-none, eucm-none, omni-radtan, omni-none.",
         _line(r"^cam\d+\s*:"),
         "cam0:\n  camera_model: pinhole",
         "file",
@@ -141,7 +148,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "vins",
         "a camera of VINS (camodocal)",
         "VINS-Mono, VINS-Fusion, camodocal",
-        "One camera of the model PINHOLE or PINHOLE_FULL.",
+        "One camera of the model PINHOLE, PINHOLE_FULL, KANNALA_BRANDT or MEI.",
         _line(r"^model_type\s*:"),
         "model_type: PINHOLE\ndistortion_parameters:",
     ),
@@ -149,15 +156,16 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "opencv",
         "a calibration of OpenCV",
         "OpenCV's FileStorage (YAML or XML), its calibration samples",
-        "One camera, or the pair of M1, D1, M2, D2, R, T with its rectification.",
-        _line(r"opencv-(?:nd-)?matrix|<opencv_storage>"),
+        "One camera, or the pair of M1, D1, M2, D2, R, T with its rectification. A fisheye with "
+        "fisheye_model: 1 or distortion_model: fisheye.",
+        _is_opencv,
         "camera_matrix: !!opencv-matrix",
     ),
     ForeignFormat(
         "ros",
         "a camera_info of ROS",
         "ROS's camera_calibration, rostopic echo, ros2 topic echo",
-        "One camera; two files with --right are a pair.",
+        "One camera, also of the model equidistant; two files with --right are a pair.",
         lambda content: (
             _line(r"^camera_matrix\s*:")(content)
             or _line(r"^[kK]\s*:", r"^distortion_model\s*:")(content)
@@ -178,7 +186,8 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "colmap",
         "a camera list of COLMAP",
         "COLMAP's cameras.txt",
-        "The camera of --camera, of any pinhole model.",
+        "The camera of --camera, of any pinhole model, or FOV and the fisheye models without thin "
+        "prism.",
         _line(r"^\s*\d+\s+[A-Z][A-Z_]+\s+\d+\s+\d+\s"),
         "1 PINHOLE 640 480 500 500 320 240",
     ),
@@ -196,7 +205,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "euroc",
         "a sensor.yaml of EuRoC",
         "EuRoC's and TUM-VI's sensor.yaml of a camera",
-        "One camera; two files with --right are a pair with its rectification.",
+        "One camera, also equidistant; two files with --right are a pair with its rectification.",
         _line(r"^sensor_type\s*:\s*camera", r"^intrinsics\s*:"),
         "sensor_type: camera\nintrinsics: [458.654, 457.296, 367.215, 248.375]",
         "right",
@@ -206,7 +215,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "stella_vslam",
         "a configuration of stella_vslam",
         "stella_vslam, OpenVSLAM",
-        "One camera of the model perspective.",
+        "One camera of the model perspective or fisheye.",
         _line(r"^Camera\s*:\s*$", r"^[ \t]+fx\s*:", r"^[ \t]+model\s*:"),
         "Camera:\n  model: perspective",
     ),
@@ -232,7 +241,8 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "basalt",
         "a calibration of Basalt",
         "Basalt, JSON",
-        "One camera, or the pair of the first two with its rectification; pinhole models.",
+        "One camera, also kb4, ds, eucm, ucm and fov, or the pair of the first two pinholes with "
+        "its rectification.",
         _is_basalt,
         '{"value0": {"intrinsics": [{"camera_type": "pinhole", ...}]}}',
         "file",
@@ -241,7 +251,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "nerfstudio",
         "a transforms.json of nerfstudio",
         "nerfstudio, instant-ngp, orbslam2py map export",
-        "The camera of all its frames.",
+        "The camera of all its frames, OPENCV or OPENCV_FISHEYE.",
         _is_nerfstudio,
         '{"camera_model": "OPENCV", "fl_x": 500.0, "frames": [...]}',
     ),
@@ -281,7 +291,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "fca",
         "a camera of the Fisheye-Calib-Adapter",
         "Fisheye-Calib-Adapter",
-        "One camera of its model RadTan.",
+        "One camera of its models RadTan, KB, DS, EUCM and UCM.",
         _line(r"^image\s*:\s*$", r"^parameter\s*:\s*$"),
         "image:\n  width: 752\nparameter:\n  fx: 459.26",
     ),
@@ -289,7 +299,8 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "numbers",
         "the numbers of a camera",
         "scripts of one's own, RealSense tools: JSON or YAML",
-        "One camera of fx, fy, cx, cy (or a camera matrix) and its coefficients.",
+        "One camera of fx, fy, cx, cy (or a camera matrix) and its coefficients; a fisheye with "
+        "its model, such as fisheye or ds.",
         _is_numbers,
         '{"fx": 600.0, "fy": 600.0, "cx": 320.0, "cy": 240.0, "width": 640, "height": 480}',
     ),

@@ -12,10 +12,10 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.settings.fisheye import (
     FISHEYE_PARAMETERS,
     LENS_PARAMETERS,
-    NO_FISHEYE_PAIR,
     PINHOLE,
     TYPES,
     fisheye_model,
+    no_fisheye_pair,
 )
 from orbslam2py.settings.foreign import new_line
 from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, parse_number, read_number
@@ -86,7 +86,8 @@ def lens_of_file(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> Fi
     if sensor is Sensor.STEREO:
         for one in found:
             if one.model != PINHOLE:
-                _refuse(one.entry, f"{one.named}: {NO_FISHEYE_PAIR}:\n    {new_line(sensor)}", path)
+                text = f"{one.named}: {no_fisheye_pair()}:\n    {new_line(sensor)}"
+                _refuse(one.entry, text, path)
     for other in found[1:]:
         if other.model != lens.model:
             text = f"{other.named} contradicts {lens.named}; keep the one that is right"
@@ -178,12 +179,12 @@ def take_lens(document: Document, lens: FileLens) -> dict[str, Any]:
         if name not in names and _value(entry) != 0:
             text = (
                 f"{entry.key} is {entry.value}, and the lens of {lens.named} has {listed} alone; "
-                f"remove {entry.key}, or name the right model"
+                "name the model to which all coefficients belong"
             )
             document.problems.append(Problem(entry.line, text))
     lacking = [f"Camera.{name}" for name in names if name not in given]
     if lacking:
-        text = f"{', '.join(lacking)}: not in the file; the lens of {lens.named} needs {listed}"
+        text = f"{lens.named} needs {listed}; add {', '.join(lacking)}"
         document.problems.append(Problem(line, text))
     numbers = []
     for name in names:

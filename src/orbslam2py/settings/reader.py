@@ -144,6 +144,7 @@ def groups_of_text(
     if missing > 1:
         advice.append(f"A complete file is written by\n    {new_line(sensor)}")
     _raise_if_any(path, problems, advice)
+    camera = _camera(values["camera"] | fisheye, lens, path)
     if sensor is not Sensor.STEREO and "LEFT.K" in document.entries:
         notes.append(
             f"{path}: LEFT.* and RIGHT.* are for stereo and not used for {sensor}: Camera.* must "
@@ -154,7 +155,7 @@ def groups_of_text(
         warn(note)
 
     return SettingsGroups(
-        camera=_camera(values["camera"] | fisheye, lens, path),
+        camera=camera,
         orb=OrbSettings(**values["orb"]),
         depth=DepthSettings(**values["depth"]) if sensor.has_depth else None,
         rectification=rectification,

@@ -20,7 +20,7 @@ from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_file, is_builtin_name
 from orbslam2py.settings.doubts import find_doubts
-from orbslam2py.settings.fisheye import LENS_PARAMETERS, NO_FISHEYE_PAIR
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, no_fisheye_pair
 from orbslam2py.settings.groups import (
     DISTORTION_FIELDS,
     CameraSettings,
@@ -109,7 +109,7 @@ class Settings:
                     "millimetres, 5000 for TUM, 1 for metres"
                 )
         if self.sensor is Sensor.STEREO and self.camera.is_fisheye:
-            problems.append(NO_FISHEYE_PAIR)
+            problems.append(no_fisheye_pair())
         raise_if_any(problems)
 
     def _check_types(self) -> None:

@@ -7,43 +7,20 @@ import re
 import shlex
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from orbslam2py import Sensor, Settings
+from support import fisheye_cameras
 from support import foreign_cameras as files
-from support.camera_files import KALIBR, ROS, written
+from support.camera_files import written
 from support.command_line import CommandLine, Outcome
+from support.fisheye_cameras import FILES
 from support.foreign_cameras import BASELINE, CX, CY, FX, FY, D, kalibr_pair
 
 IMPORT = ("import-camera", "file", "--output", "my.yaml")
 THIN_PRISM = files.ROS1.replace(str(list(D)), str([*files.RATIONAL, 0.01, 0.02, 0.03, 0.04]))
-FISHEYE = (0.02, -0.01, 0.004, -0.001)
-FISHEYE_NAMES = dict(zip(("k1", "k2", "k3", "k4"), FISHEYE, strict=True))
-EQUIDISTANT = {
-    "kalibr": KALIBR.replace("radtan", "equidistant"),
-    "ros": ROS.replace("plumb_bob", "equidistant"),
-    "euroc": files.EUROC.replace("radial-tangential", "equidistant"),
-    "opencv": "fisheye_model: 1\n" + files.matrix("K", files.ROWS) + files.matrix("D", FISHEYE, 4),
-    "colmap": f"1 OPENCV_FISHEYE 640 480 {FX} {FY} {CX} {CY} 0.02 -0.01 0.004 -0.001\n",
-    "basalt": files.basalt("kb4", files.NUMBERS | FISHEYE_NAMES),
-    "oak": '{"cameraData": [[0, {"cameraType": 1, "width": 640, "height": 480}]]}',
-    "vins": "model_type: KANNALA_BRANDT\nimage_width: 640\nimage_height: 480\n",
-    "stella": files.STELLA.replace("perspective", "fisheye"),
-    "nerfstudio": files.NERFSTUDIO.replace('"OPENCV"', '"OPENCV_FISHEYE"'),
-    "fca": files.FCA.partition("  k1")[0] + "  k1: 0.1\n  k2: 0\n  k3: 0\n  k4: 0\n",
-    "numbers": '{"fx": 200, "fy": 200, "cx": 320, "cy": 240, "model": "fisheye"}',
-    "by its coefficients": '{"fx": 200, "fy": 200, "cx": 320, "cy": 240, "k1": 0, "k4": 0.1}',
-    "orb-slam3": 'Camera.type: "KannalaBrandt8"\nCamera1.fx: 200\n',
-}
 OTHER_LENSES = {
-    "double sphere": (KALIBR.replace("pinhole", "ds"), "double sphere"),
-    "eucm": (files.basalt("eucm", files.NUMBERS), "EUCM"),
-    "omni": (KALIBR.replace("pinhole", "omni"), "Mei"),
-    "mei": ("model_type: MEI\nimage_width: 640\nimage_height: 480\n", "Mei"),
-    "fov": (KALIBR.replace("radtan", "fov"), "field-of-view"),
-    "colmap fov": ("1 FOV 640 480 300 300 320 240 0.9\n", "field-of-view"),
     "thin prism": ("1 THIN_PRISM_FISHEYE 640 480 300 300 320 240\n", "thin prism"),
     "polynomial": ('{"intrinsic": {"model": "radial_poly", "k1": 339.7}}', "polynomial"),
     "scaramuzza": ("model_type: SCARAMUZZA\nimage_width: 640\nimage_height: 480\n", "Scaramuzza"),
@@ -146,36 +123,54 @@ def test_the_depth_factor_is_printed(
     assert "units per metre" not in command(*IMPORT, "--force").out
 
 
-@pytest.mark.parametrize("name", EQUIDISTANT)
-def test_fisheye_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path, name: str) -> None:
-    written(tmp_path, EQUIDISTANT[name], "file")
-    message = refused(command(*IMPORT))
-    assert "is a fisheye camera (equidistant, also called Kannala-Brandt)" in message
-    assert "only pinhole cameras are supported" in message
-    assert "cv2.fisheye.undistortImage" in message
-    assert not re.search(r"--f[xy] [\d.]", message), "the numbers of a fisheye camera are wrong"
-    # The line leads to settings of the images that OpenCV makes.
-    K = np.array(files.K)
-    new = np.diag([0.5, 0.5, 1.0]) @ K
-    values = {"FX": new[0, 0], "FY": new[1, 1], "CX": new[0, 2], "CY": new[1, 2]}
-    line = [str(values.get(word, word)) for word in line_in(message)]
-    assert command(*line).code == 0
-    points = np.array([[0.4, -0.2, 1.0], [2.0, 1.0, 1.5]])
-    nothing = np.zeros(3)
-    raw, _ = cv2.fisheye.projectPoints(points[:, None], nothing, nothing, K, np.array(FISHEYE))
-    straight = cv2.fisheye.undistortPoints(raw, K, np.array(FISHEYE), P=new)
-    camera = Settings.load("my.yaml", "mono").camera
-    np.testing.assert_allclose(camera.project(points), straight.reshape(-1, 2), atol=1e-3)
+@pytest.mark.parametrize("name", ["kalibr ds", "colmap", "vins mei", "basalt ucm", "stella"])
+@pytest.mark.parametrize("sensor", [Sensor.MONOCULAR, Sensor.RGBD])
+def test_fisheye_is_read_and_told(
+    command: CommandLine, tmp_path: Path, name: str, sensor: Sensor
+) -> None:
+    text, model, lens = FILES[name]
+    written(tmp_path, text, "file")
+    done = command(*IMPORT, "--sensor", sensor)
+    assert done.code == 0, done.err
+    assert f"fisheye lens {model}: " in done.out
+    assert "WARNING" not in done.err.upper()
+    camera = Settings.load("my.yaml", sensor).camera
+    assert (camera.model, camera.lens) == (model, lens)
+    assert numbers_of("my.yaml", sensor) == (FX, FY, CX, CY)
+    checked = command("settings", "check", "my.yaml", "--sensor", sensor)
+    assert checked.code == 0, checked.err
+    assert f"fisheye lens {model}: " in checked.out
+    assert "stereo" not in checked.out
+
+
+@pytest.mark.parametrize("name", ["kalibr equi", "basalt eucm", "ros", "numbers"])
+def test_one_fisheye_is_no_pair(command: CommandLine, tmp_path: Path, name: str) -> None:
+    written(tmp_path, FILES[name][0], "file")
+    message = refused(command(*IMPORT, "--sensor", "stereo"))
+    assert "a stereo pair of fisheye cameras is not supported yet" in message
+    assert "use one of its cameras alone (--sensor mono)" in message
+    assert command(*IMPORT, "--sensor", "mono").code == 0
+
+
+def test_a_fisheye_file_of_orb_slam3_is_settings_already(
+    command: CommandLine, tmp_path: Path
+) -> None:
+    written(tmp_path, fisheye_cameras.MONO, "file")
+    assert "file is a settings file already" in refused(command(*IMPORT))
+    assert command("settings", "check", "./file").code == 0
 
 
 def test_pair_of_fisheyes(command: CommandLine, tmp_path: Path) -> None:
     written(tmp_path, kalibr_pair(0).replace("radtan", "equidistant"), "file")
     message = refused(command(*IMPORT))
     assert "file is a camchain of Kalibr: cam0 is a fisheye camera" in message
+    assert "take one of them with --camera 0" in message
     assert "cv2.fisheye.stereoRectify" in message
     words = {"FX": "300", "FY": "300", "CX": "320", "CY": "240", "METRES": "0.12"}
     assert command(*[words.get(word, word) for word in line_in(message)]).code == 0
     assert Settings.load("my.yaml", "stereo").baseline == pytest.approx(0.12)
+    assert command(*IMPORT, "--camera", "0", "--force").code == 0
+    assert Settings.load("my.yaml", "mono").camera.lens == D[:4]
 
 
 @pytest.mark.parametrize("name", OTHER_LENSES)
@@ -184,7 +179,7 @@ def test_other_lenses(command: CommandLine, tmp_path: Path, name: str) -> None:
     written(tmp_path, text, "file")
     message = refused(command(*IMPORT))
     assert lens in message
-    assert "only pinhole cameras are supported; calibrate the camera with the equidist" in message
+    assert "which is not supported; calibrate the camera with a supported fisheye" in message
     assert "orbslam2py calibrate" in message
     assert "--fx" not in message
 

@@ -120,11 +120,26 @@ def test_euroc_stamp_twice_or_backwards(euroc: Path, caplog: pytest.LogCaptureFi
     assert "are not in the order of time; they are sorted" in caplog.text
 
 
+def test_a_fisheye_of_tum_vi(euroc: Path) -> None:
+    """One camera is read with its lens; the pair is refused."""
+    for camera in ("cam0", "cam1"):
+        path = euroc / "mav0" / camera / "sensor.yaml"
+        path.write_text(path.read_text().replace("radial-tangential", "equidistant"))
+    camera = open_sequence(euroc, Sensor.MONOCULAR).settings.camera
+    text = (euroc / "mav0" / "cam0" / "sensor.yaml").read_text()
+    numbers = text.partition("distortion_coefficients: [")[2].partition("]")[0]
+    assert camera.model == "kannala_brandt"
+    assert camera.lens == tuple(map(float, numbers.split(",")))
+    assert (camera.fx, camera.is_distorted) == (40.0, False)
+    with pytest.raises(DatasetError, match=r"sensor\.yaml: a stereo pair of fisheye"):
+        _ = open_sequence(euroc, Sensor.STEREO).settings
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ("camera_model: pinhole", "camera_model: omni", "allowed: pinhole"),
-        ("radial-tangential", "equidistant", "allowed: radial-tangential"),
+        ("radial-tangential", "cubic", "allowed: radial-tangential or equidistant"),
         ("intrinsics: [40.0,", "intrinsics: [", "intrinsics must hold 4 numbers"),
         ("intrinsics: [40.0,", "intrinsics: [x,", "intrinsics: 'x' is not a number"),
         ("intrinsics: [40.0,", "intrinsics: [-40.0,", "intrinsics has the focal lengths -40, 41"),

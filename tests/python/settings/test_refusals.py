@@ -124,7 +124,7 @@ def test_a_missing_factor_is_told_with_usual_values(tmp_path: Path) -> None:
         ),
         ("ORBextractor.originalCoordinates", "yes", "'yes' is not a number"),
         ("Viewer.PointSize", "0", "allowed"),
-        ("Camera.type", "KannalaBrandt8", "belongs to a fisheye calibration"),
+        ("Camera.type", "KannalaBrandt8", "needs Camera.k1, Camera.k2, Camera.k3, Camera.k4; add"),
         ("Camera.type", "Cylinder", "allowed: PinHole"),
     ],
 )

@@ -16,6 +16,7 @@ from orbslam2py.calibration.camera_model import (
     checked_camera_matrix,
     checked_numbers,
     checked_size,
+    kannala_brandt_numbers,
     opencv_coefficients,
     pinhole_matrix,
     pose_of_parts,
@@ -35,7 +36,7 @@ _METRES_PER_CENTIMETRE, _METRES_PER_MILLIMETRE = 0.01, 0.001
 
 # ---- OAK -----------------------------------------------------------------------------------------
 #: By the number of ``cameraType``.
-_OAK_LENSES = {"0": PINHOLE, "1": "equidistant", "2": "equirectangular", "3": "polynomial"}
+_OAK_LENSES = {"0": PINHOLE, "1": "kannala_brandt", "2": "equirectangular", "3": "polynomial"}
 
 
 def read_oak(source: CalibrationSource) -> CameraFile:
@@ -112,11 +113,16 @@ def _oak_camera(
     kind = values.get("cameraType", 0)
     lens = _OAK_LENSES.get(str(kind)) or lens_of(path, "cameraType", kind)
     K, D = None, NO_DISTORTION
-    if lens == PINHOLE:
+    numbers: tuple[float, ...] = ()
+    if lens in (PINHOLE, "kannala_brandt"):
         matrix = source.value("intrinsicMatrix", values, f"{name}: ")
         K = checked_camera_matrix(path, matrix, "intrinsicMatrix")
-        D = opencv_coefficients(path, values.get("distortionCoeff", []), K, size)
-    return ForeignCamera(name, socket, K, D, size, lens, T)
+        given = values.get("distortionCoeff", [])
+        if lens == PINHOLE:
+            D = opencv_coefficients(path, given, K, size)
+        else:
+            numbers = kannala_brandt_numbers(path, "distortionCoeff", given)
+    return ForeignCamera(name, socket, K, D, size, lens, T, lens_numbers=numbers)
 
 
 # ---- ZED -----------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from orbslam2py.calibration.camera_model import (
     checked_camera_matrix,
     checked_numbers,
     checked_size,
+    kannala_brandt_numbers,
     opencv_coefficients,
     pose_of_parts,
 )
@@ -26,8 +27,9 @@ from orbslam2py.calibration.foreign_cameras import (
     both_ways,
     first_of,
 )
-from orbslam2py.calibration.lenses import PINHOLE
+from orbslam2py.calibration.lenses import PINHOLE, lens_of
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.fisheye import LENS_PARAMETERS
 
 _ONE = (
     ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "mtx", "intrinsic_matrix"),
@@ -75,7 +77,9 @@ def read_opencv(source: CalibrationSource) -> CameraFile:
     R, T = (_matrix(source, values, names) for names in (_ROTATION, _TRANSLATION))
     sides = _sides(values)
     size = source.size if sides is None else checked_size(path, sides)
-    lens = "equidistant" if fisheye else PINHOLE
+    lens = "kannala_brandt" if fisheye else PINHOLE
+    if not fisheye and isinstance(model := values.get("distortion_model"), str):
+        lens = lens_of(f"{path}", "distortion_model", model)
     if left[0] is None or right[0] is None:
         K, D = one if one[0] is not None else left
         return CameraFile((_camera(source, "the camera", 0, (K, D), size, lens, None),))
@@ -107,10 +111,19 @@ def _camera(
             "camera_matrix, or name another --format"
         )
     K = checked_camera_matrix(path, K)
-    known = NO_DISTORTION
+    given = np.zeros(0) if D is None else D
     if lens == PINHOLE:
-        known = opencv_coefficients(path, np.zeros(0) if D is None else D, K, size)
-    return ForeignCamera(name, number, K, known, size, lens, T)
+        known = opencv_coefficients(path, given, K, size)
+        return ForeignCamera(name, number, K, known, size, lens, T)
+    numbers: tuple[float, ...] = ()
+    if lens == "kannala_brandt":
+        numbers = kannala_brandt_numbers(path, "the distortion", given.tolist())
+    elif lens in LENS_PARAMETERS:
+        raise SettingsError(
+            f"{path}: OpenCV has no {lens} lens; give the numbers with orbslam2py settings new "
+            "--model"
+        )
+    return ForeignCamera(name, number, K, NO_DISTORTION, size, lens, T, lens_numbers=numbers)
 
 
 def _sides(values: Mapping[str, Any]) -> object:

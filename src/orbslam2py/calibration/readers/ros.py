@@ -14,6 +14,7 @@ from orbslam2py.calibration.camera_model import (
     checked_camera_matrix,
     checked_numbers,
     checked_size,
+    kannala_brandt_numbers,
     opencv_coefficients,
 )
 from orbslam2py.calibration.foreign_cameras import (
@@ -26,6 +27,7 @@ from orbslam2py.calibration.foreign_cameras import (
 )
 from orbslam2py.calibration.lenses import PINHOLE, lens_of
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.fisheye import LENS_PARAMETERS
 
 _K, _D = ("camera_matrix", "K", "k"), ("distortion_coefficients", "D", "d")
 _R, _P = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
@@ -52,10 +54,18 @@ def read_camera_info(source: CalibrationSource) -> CameraFile:
     K = K.reshape(3, 3)
     crop, size = _crop(source, size)
     K = crop @ K
+    K = checked_camera_matrix(path, K)
     D = NO_DISTORTION
+    numbers: tuple[float, ...] = ()
     if lens == PINHOLE:
-        K = checked_camera_matrix(path, K)
         D = opencv_coefficients(path, _matrix(source, _D, None), K, size)
+    elif lens == "kannala_brandt":
+        numbers = kannala_brandt_numbers(path, "distortion", _matrix(source, _D, None))
+    elif lens in LENS_PARAMETERS:
+        raise SettingsError(
+            f"{path}: ROS has no rule for the coefficients of distortion_model {model}; give the "
+            "numbers with orbslam2py settings new --model"
+        )
     name = str(values.get("camera_name", "the camera"))
     camera = ForeignCamera(
         name,
@@ -66,6 +76,7 @@ def read_camera_info(source: CalibrationSource) -> CameraFile:
         lens,
         R=None if R is None else R.reshape(3, 3),
         P=None if P is None else crop @ P.reshape(3, 4),
+        lens_numbers=numbers,
     )
     return CameraFile((camera,), place_key="projection_matrix")
 

@@ -14,6 +14,7 @@ from orbslam2py.calibration.camera_model import (
     checked_camera_matrix,
     checked_numbers,
     checked_size,
+    kannala_brandt_numbers,
     opencv_coefficients,
     pinhole_matrix,
 )
@@ -26,12 +27,13 @@ from orbslam2py.calibration.foreign_cameras import (
     in_order,
 )
 from orbslam2py.calibration.lenses import PINHOLE, lens_of
-from orbslam2py.calibration.readers.slam_systems import lens_by_keys
+from orbslam2py.calibration.readers.slam_systems import lens_by_keys, lens_parameters, named_lens
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.foreign import MATRIX_KEYS
 
 _FIVE = ("k1", "k2", "p1", "p2", "k3")
 _EIGHT = (*_FIVE, "k4", "k5", "k6")
+_RADIAL = ("k1", "k2", "k3", "k4")
 _NAME = "the camera"
 
 
@@ -55,13 +57,22 @@ def read_nerfstudio(source: CalibrationSource) -> CameraFile:
     size = None
     if "w" in values and "h" in values:
         size = checked_size(path, [values["w"], values["h"]], "w and h")
-    if lens != PINHOLE:
+    if lens not in (PINHOLE, "kannala_brandt"):
+        if lens_parameters(lens) is not None:
+            raise SettingsError(
+                f"{path}: nerfstudio has no camera_model {model}; give OPENCV or OPENCV_FISHEYE"
+            )
         return _one(ForeignCamera(_NAME, 0, None, NO_DISTORTION, size, lens))
     # The centre of the first pixel is (0.5, 0.5), as in COLMAP, from where the numbers come.
     cx, cy = (_middle(source, values, key, size, i) - 0.5 for i, key in enumerate(("cx", "cy")))
     fx = _focal(source, values, "x", size)
     fy = _focal(source, values, "y", size) if {"fl_y", "camera_angle_y"} & set(values) else fx
     K = pinhole_matrix(path, "fl_x, fl_y, cx, cy", [fx, fy, cx, cy])
+    note = "cx and cy of nerfstudio count from the image's corner; half a pixel is taken off"
+    if lens == "kannala_brandt":
+        numbers = kannala_brandt_numbers(path, "k1, k2, k3, k4", in_order(values, *_RADIAL))
+        fisheye = ForeignCamera(_NAME, 0, K, NO_DISTORTION, size, lens, lens_numbers=numbers)
+        return CameraFile((fisheye,), note=note)
     if values.get("k4"):
         raise SettingsError(
             f"{path}: k4 is {values['k4']}, and only k1, k2, k3, p1, p2 of a pinhole camera are "
@@ -69,7 +80,6 @@ def read_nerfstudio(source: CalibrationSource) -> CameraFile:
             "undistorted"
         )
     D = opencv_coefficients(path, in_order(values, *_FIVE), K, size)
-    note = "cx and cy of nerfstudio count from the image's corner; half a pixel is taken off"
     return CameraFile((ForeignCamera(_NAME, 0, K, D, size),), note=note)
 
 
@@ -169,23 +179,47 @@ _MODELS = ("distortion_model", "camera_model", "model", "lens", "camera_type")
 def read_numbers(source: CalibrationSource) -> CameraFile:
     """Read fx, fy, cx, cy or a camera matrix, and coefficients in OpenCV's order or by names."""
     path, values = source.path, source.values
-    lens = lens_by_keys(values)
-    model = first_of(values, *_MODELS)
-    given = first_of(values, *_COEFFICIENTS)
-    if lens == PINHOLE and (given is None or isinstance(given, Mapping)):
-        given = _coefficients_by_name(source, values if given is None else given)
-    # Without coefficients RealSense's models are the same.
-    plain = "brown_conrady" in str(model) and not np.any(checked_numbers(path, "coeffs", given, ()))
-    if lens == PINHOLE and model is not None and not plain:
-        lens = lens_of(f"{path}", "the model", str(model).rpartition(".")[2])
+    lens, given = _lens_of_numbers(source)
     size = source.size
     sides = [first_of(values, *names) for names in _SIZES]
     if None not in sides:
         size = checked_size(path, sides, "width and height")
-    if lens != PINHOLE:
+    names = lens_parameters(lens)
+    if names is None:
         return _one(ForeignCamera(_NAME, 0, None, NO_DISTORTION, size, lens))
     K = _numbers_matrix(source)
+    if names:
+        if isinstance(given, Mapping):
+            numbers = named_lens(source, given, "", names)
+        elif lens == "kannala_brandt":
+            numbers = kannala_brandt_numbers(path, "the distortion", given)
+        else:
+            numbers = tuple(checked_numbers(path, "the distortion", given, (len(names),)).tolist())
+        return _one(ForeignCamera(_NAME, 0, K, NO_DISTORTION, size, lens, lens_numbers=numbers))
     return _one(ForeignCamera(_NAME, 0, K, opencv_coefficients(path, given, K, size), size))
+
+
+def _lens_of_numbers(source: CalibrationSource) -> tuple[str, Any]:
+    """Find the lens, and its coefficients: a list, or named values of a fisheye lens."""
+    values = source.values
+    listed = first_of(values, *_COEFFICIENTS)
+    named = listed if isinstance(listed, Mapping) else values if listed is None else {}
+    model, by_keys = first_of(values, *_MODELS), lens_by_keys(named or values)
+    lens = by_keys
+    # Without coefficients RealSense's models are the same.
+    plain = "brown_conrady" in str(model) and not (
+        named or np.any(checked_numbers(source.path, "coeffs", listed, ()))
+    )
+    if model is not None and not plain:
+        lens = lens_of(f"{source.path}", "the model", str(model).rpartition(".")[2])
+        if lens == PINHOLE and by_keys != PINHOLE:
+            raise SettingsError(
+                f"{source.path}: the model {model} is a pinhole's, and the numbers are those of a "
+                f"{by_keys} lens; name the right model"
+            )
+    if lens == PINHOLE and named:
+        return lens, _coefficients_by_name(source, named)
+    return lens, named or listed
 
 
 def _coefficients_by_name(source: CalibrationSource, values: Mapping[str, Any]) -> list[Any]:

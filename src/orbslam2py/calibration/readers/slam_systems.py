@@ -13,6 +13,7 @@ from orbslam2py.calibration.camera_model import (
     checked_numbers,
     checked_pose,
     checked_size,
+    kannala_brandt_numbers,
     opencv_coefficients,
     pinhole_matrix,
     pose_of_parts,
@@ -25,8 +26,9 @@ from orbslam2py.calibration.foreign_cameras import (
     both_ways,
     in_order,
 )
-from orbslam2py.calibration.lenses import PINHOLE, lens_of
+from orbslam2py.calibration.lenses import PINHOLE, UNIFIED, lens_of
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.fisheye import LENS_PARAMETERS
 from orbslam2py.trajectory.rotations import inverse_poses, rotations_from_quaternions
 
 _FIVE = ("k1", "k2", "p1", "p2", "k3")
@@ -45,7 +47,7 @@ def named_camera(
     number: int = 0,
     T_camera_rig: FloatArray | None = None,
 ) -> ForeignCamera:
-    """Make a camera of values fx, fy, cx, cy; those of other lenses are not looked at.
+    """Make a camera of values fx, fy, cx, cy and, for a fisheye, its parameters by their names.
 
     Parameters
     ----------
@@ -58,17 +60,46 @@ def named_camera(
     size
         Width and height [pixels].
     coefficients
-        In OpenCV's order.
+        In OpenCV's order; not used for a fisheye.
     number, T_camera_rig
         As `ForeignCamera` has them.
     """
     name = where.rstrip(".") or "the camera"
-    K, D = None, NO_DISTORTION
+    names = lens_parameters(lens)
+    if names is None:
+        return ForeignCamera(name, number, None, NO_DISTORTION, size, lens, T_camera_rig)
+    given = [source.value(key, values, where) for key in _PINHOLE]
+    K = pinhole_matrix(source.path, f"{where}fx, fy, cx, cy", given)
+    D, numbers = NO_DISTORTION, named_lens(source, values, where, names)
     if lens == PINHOLE:
-        given = [source.value(key, values, where) for key in _PINHOLE]
-        K = pinhole_matrix(source.path, f"{where}fx, fy, cx, cy", given)
         D = opencv_coefficients(f"{source.path}: {name}", coefficients, K, size)
-    return ForeignCamera(name, number, K, D, size, lens, T_camera_rig)
+    return ForeignCamera(name, number, K, D, size, lens, T_camera_rig, lens_numbers=numbers)
+
+
+def lens_parameters(lens: str) -> tuple[str, ...] | None:
+    """Names of the parameters of a lens that is supported; None for another one."""
+    if lens == PINHOLE:
+        return ()
+    return ("alpha",) if lens == UNIFIED else LENS_PARAMETERS.get(lens)
+
+
+def named_lens(
+    source: CalibrationSource, values: Mapping[str, Any], where: str, names: tuple[str, ...]
+) -> tuple[float, ...]:
+    """Take the parameters of a fisheye lens by their names.
+
+    Raises
+    ------
+    SettingsError
+        If one is missing or no number.
+    """
+    found = []
+    for name in names:
+        # Basalt and others call the angle of the field-of-view model w.
+        key = "w" if name == "omega" and name not in values and "w" in values else name
+        given = source.value(key, values, where)
+        found.append(float(checked_numbers(source.path, f"{where}{key}", given, (1,))[0]))
+    return tuple(found)
 
 
 # ---- EuRoC ---------------------------------------------------------------------------------------
@@ -82,7 +113,7 @@ def read_euroc(source: CalibrationSource) -> CameraFile:
     size = checked_size(path, source.value("resolution"), "resolution")
     given = checked_numbers(path, "intrinsics", source.value("intrinsics"), ())
     numbers = dict(zip(_PINHOLE, given, strict=False)) if given.size == 4 else {}
-    if lens == PINHOLE and not numbers:
+    if lens_parameters(lens) is not None and not numbers:
         raise SettingsError(f"{path}: intrinsics must hold 4 numbers; give fx, fy, cx, cy")
     rate = values.get("rate_hz")
     T = None
@@ -90,24 +121,63 @@ def read_euroc(source: CalibrationSource) -> CameraFile:
         T_BS = checked_pose(path, "T_BS", source.value("data", place, "T_BS."))
         T = inverse_poses(T_BS[None])[0]
     coefficients = values.get("distortion_coefficients", [])
+    numbers = numbers | _euroc_lens(source, lens, coefficients)
     camera = named_camera(source, numbers, "", lens, size, coefficients, T_camera_rig=T)
     fps = None if rate is None else float(checked_numbers(path, "rate_hz", rate, (1,))[0])
     return CameraFile((camera,), place_key="T_BS", fps=fps)
 
 
+def _euroc_lens(source: CalibrationSource, lens: str, coefficients: object) -> dict[str, float]:
+    """Name the coefficients of a fisheye lens."""
+    names = lens_parameters(lens)
+    if not names:
+        return {}
+    if lens == "kannala_brandt":
+        given = kannala_brandt_numbers(source.path, "distortion_coefficients", coefficients)
+    elif lens == "fov":
+        found = checked_numbers(source.path, "distortion_coefficients", coefficients, (1,))
+        given = tuple(found.tolist())
+    else:
+        raise SettingsError(
+            f"{source.path}: a sensor.yaml has no rule for the numbers of the {lens} lens; give "
+            "them with orbslam2py settings new --model"
+        )
+    return dict(zip(names, given, strict=True))
+
+
 # ---- VINS ----------------------------------------------------------------------------------------
+#: What camodocal calls the parameters of fisheye lenses.
+_CAMODOCAL = {
+    "kannala_brandt": {
+        **{"fx": "mu", "fy": "mv", "cx": "u0", "cy": "v0"},
+        **{"k1": "k2", "k2": "k3", "k3": "k4", "k4": "k5"},
+    },
+    "mei": {
+        **{"fx": "gamma1", "fy": "gamma2", "cx": "u0", "cy": "v0"},
+        **{name: name for name in ("xi", "k1", "k2", "p1", "p2")},
+    },
+}
+
+
 def read_vins(source: CalibrationSource) -> CameraFile:
-    """Read a camera of camodocal's models PINHOLE and PINHOLE_FULL (rational)."""
+    """Read a camera of camodocal: PINHOLE, PINHOLE_FULL (rational), KANNALA_BRANDT, MEI."""
     lens = lens_of(f"{source.path}", "model_type", source.value("model_type"))
     sides = [source.value("image_width"), source.value("image_height")]
     size = checked_size(source.path, sides, "image_width and image_height")
     numbers: Mapping[str, Any] = {}
     D: Mapping[str, Any] = {}
-    if lens == PINHOLE:
+    if lens in (PINHOLE, *_CAMODOCAL):
         key = "projection_parameters"
         numbers = source.mapping(source.value(key), key)
+    if lens in (PINHOLE, "mei"):
         key = "distortion_parameters"
         D = source.mapping(source.values.get(key, {}), key)
+    if lens in _CAMODOCAL:
+        if lens == "mei":
+            key = "mirror_parameters"
+            numbers = {**numbers, **D, **source.mapping(source.value(key), key)}
+        names = _CAMODOCAL[lens]
+        numbers = {ours: source.value(theirs, numbers) for ours, theirs in names.items()}
     camera = named_camera(source, numbers, "", lens, size, in_order(D, *_EIGHT))
     return CameraFile((camera,))
 
@@ -184,6 +254,8 @@ def read_fca(source: CalibrationSource) -> CameraFile:
     values = source.mapping(source.value("parameter"), "parameter")
     size = checked_size(source.path, sides)
     lens = lens_by_keys(values)
+    if lens == PINHOLE and "alpha" in values:
+        lens = UNIFIED
     where = "parameter."
     camera = named_camera(source, values, where, lens, size, in_order(values, *_FIVE))
     return CameraFile((camera,))
@@ -192,9 +264,11 @@ def read_fca(source: CalibrationSource) -> CameraFile:
 def lens_by_keys(values: Mapping[str, Any]) -> str:
     """Tell a lens by the names of its numbers."""
     if "alpha" in values and ("xi" in values or "beta" in values):
-        return "double sphere" if "xi" in values else "eucm"
+        return "double_sphere" if "xi" in values else "eucm"
     if "xi" in values:
-        return "omni"
+        return "mei"
+    if "omega" in values:
+        return "fov"
     if "k4" in values and not {"p1", "p2", "k5"} & set(values):
-        return "equidistant"
+        return "kannala_brandt"
     return PINHOLE

@@ -21,6 +21,7 @@ from orbslam2py.settings import (
 )
 from orbslam2py.settings.projection import distorted
 
+_FISHEYES = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4")
 _MODELS = ("plumb_bob", "rational_polynomial", "radtan", "brown_conrady", "")
 #: Models of the RealSense SDK that are none if all coefficients are 0, as a rule.
 _NONE_IF_ZERO = ("none", "modified_brown_conrady")
@@ -96,6 +97,26 @@ class CameraInfo:
         """Camera matrix of rectified images (3, 3); the raw one if there is no projection."""
         return self.P[:, :3] if self.P[0, 0] > 0 else self.K
 
+    @property
+    def is_fisheye(self) -> bool:
+        """Whether raw images are those of an equidistant (Kannala-Brandt) lens."""
+        return self.model in _FISHEYES
+
+    def fisheye_lens(self) -> tuple[float, ...]:
+        """Return k1, k2, k3, k4 of an equidistant lens.
+
+        Raises
+        ------
+        DatasetError
+            If there are fewer numbers, or more that are not 0.
+        """
+        if self.D.size < 4 or self.D[4:].any():
+            raise DatasetError(
+                f"{self.what}: the distortion model {self.model} needs the 4 numbers k1, k2, k3, "
+                f"k4, and D has {self.D.size}; {_ADVICE}"
+            )
+        return tuple(self.D[:4].tolist())
+
     def distortion(self) -> FloatArray:
         """Return k1, k2, p1, p2, k3, k4, k5, k6.
 
@@ -104,6 +125,12 @@ class CameraInfo:
         DatasetError
             If the model has other coefficients.
         """
+        if self.is_fisheye:
+            raise DatasetError(
+                f"{self.what}: the distortion model {self.model} is not supported for stereo, nor "
+                "for depth of another camera; use one camera (--sensor mono), record rectified "
+                f"images (image_proc), or {_ADVICE} of undistorted ones"
+            )
         if self.model not in _MODELS:
             raise DatasetError(
                 f"{self.what}: the distortion model {self.model} is not supported; record "
@@ -143,8 +170,11 @@ def settings_of_camera(
         If the calibration cannot be used.
     """
     K = info.rectified_K if rectified else info.K
-    coefficients = np.zeros(8) if rectified else info.distortion()
-    lens = dict(zip(_COEFFICIENTS, coefficients.tolist(), strict=True))
+    lens: dict[str, Any] = {}
+    if not rectified and info.is_fisheye:
+        lens = {"model": "kannala_brandt", "lens": info.fisheye_lens()}
+    elif not rectified:
+        lens = dict(zip(_COEFFICIENTS, info.distortion().tolist(), strict=True))
     try:
         camera = CameraSettings(**_pinhole(K, info.size), **lens, fps=fps, rgb=True)
         return settings_for_camera(camera, sensor, depth_factor=depth_factor)

@@ -126,6 +126,13 @@ def find_depth_camera(
         raise _cannot_be_registered(bag, topics, depth, how, missing, T)
     if not how and _in_one_place(T, depth_info):
         return None
+    of_bag = colour_info is not None and colour_info.is_fisheye and not images.is_rectified
+    if of_bag if chosen is None else chosen.camera.is_fisheye:
+        raise DatasetError(
+            f"{bag.path}: depth of {depth.topic.name} is of another camera than "
+            f"{images.topic.name}, and depth cannot be registered to a fisheye camera; record "
+            "depth that is registered to the images, or run with --sensor mono"
+        )
     _log.info(
         "%s: depth of %s is of another camera than %s (%s); it is registered with the calibrations "
         "of both and the transform between them (%.1f mm apart)",

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -112,10 +113,11 @@ class DriveCalibration:
         more: Mapping[str, float],
         rectification: StereoRectification | None = None,
     ) -> Settings:
-        numbers = {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2], **more}
+        given = {"fx": K[0, 0], "fy": K[1, 1], "cx": K[0, 2], "cy": K[1, 2], **more}
+        numbers: dict[str, Any] = {name: float(value) for name, value in given.items()}
         try:
             camera = CameraSettings(
-                **{name: float(value) for name, value in numbers.items()},
+                **numbers,
                 width=size[0],
                 height=size[1],
                 fps=fps,

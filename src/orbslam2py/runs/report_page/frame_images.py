@@ -123,12 +123,9 @@ def draw_frame(small: SmallImage, points: FloatArray, settings: Settings) -> byt
     """
     shown = small.picture
     size = shown.shape[1::-1]
-    front = points[points[:, 2] > 1e-6]
-    if len(front):
-        camera = settings.camera
-        origin = np.zeros(3)
-        pixels = cv2.projectPoints(front, origin, origin, camera.matrix, camera.distortion)[0]
-        pixels = pixels[:, 0] * small.scale
+    if len(points):
+        # NaN, of points that the camera does not show, is not inside.
+        pixels = settings.camera.project(points) * small.scale
         inside = np.all((pixels > -1) & (pixels < np.array(size) + 1), axis=1)
         for radius, colour in ((3, _RIM), (2, _FILL)):
             for u, v in np.rint(pixels[inside]).astype(int).tolist():

@@ -4,9 +4,6 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,46 +14,19 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support import bags
 from support import other_settings as texts
 from support.command_line import CommandLine
-from support.settings_files import DEPTH, MONO
-from support.spoilt_runs import expect_refused, run
+from support.refused_settings import (
+    OURS,
+    OURS_DEPTH,
+    Case,
+    instead,
+    refuse_and_follow,
+    without,
+)
+from support.spoilt_runs import run
 
 pytestmark = pytest.mark.watchdog(40)
 
-OURS = "".join(f"{key}: {value}\n" for key, value in MONO.items())
-OURS_DEPTH = OURS + "".join(f"{key}: {value}\n" for key, value in DEPTH.items())
-FOUR = "Camera.k1: -0.01\nCamera.k2: 0.05\nCamera.k3: -0.04\nCamera.k4: 0.01\n"
-FISHEYE = (
-    "belongs to a fisheye calibration (Kannala-Brandt, k1 to k4)",
-    "cv2.fisheye.initUndistort",
-)
 WHAT_HELPS = "orbslam2py settings new --sensor"
-
-
-@dataclass(frozen=True)
-class Case:
-    """A wrong file, what is said, and the file when the message has been followed.
-
-    Without `right` the message asks for other images, or for numbers that the file does not have.
-    """
-
-    text: str
-    told: tuple[str, ...]
-    right: Callable[[str], str] | None = None
-    check: Callable[[Settings], bool] | None = None
-    sensor: str = "mono"
-
-
-def without(pattern: str) -> Callable[[str], str]:
-    """Begin the lines with #."""
-    return lambda text: re.sub(rf"^(?={pattern})", "# ", text, flags=re.MULTILINE)
-
-
-def instead(old: str, new: str) -> Callable[[str], str]:
-    def change(text: str) -> str:
-        assert old in text
-        return text.replace(old, new)
-
-    return change
 
 
 PAIR = texts.PAIR_V1
@@ -64,31 +34,7 @@ T_INVERSE = texts.pose_text(np.linalg.inv(texts.T_C1_C2))
 T_MIRROR = texts.pose_text(texts.T_C1_C2 * [[1, 1, -1, 1]])
 
 CASES = {
-    # ---- fisheye lenses and others -------------------------------------------------------------
-    "four radial": Case(OURS + FOUR, ("Camera.k4 without k5 and k6", *FISHEYE, WHAT_HELPS)),
-    "four radial, p1 and p2 of 0": Case(
-        OURS + FOUR + "Camera.p1: 0\nCamera.p2: 0\n", ("Camera.k4 without k5", *FISHEYE)
-    ),
-    "fourth radial of 0": Case(
-        OURS + FOUR.replace("k4: 0.01", "k4: 0"), ("Camera.k4 without k5 and k6", *FISHEYE)
-    ),
-    "four radial of Camera1": Case(
-        texts.MONO_V1.replace("Camera1.p1: 0.0002\nCamera1.p2", "Camera1.k3: 0.1\nCamera1.k4"),
-        ("Camera1.k4 without k5 and k6", *FISHEYE),
-    ),
-    "Camera.type": Case(
-        texts.MONO_V1.replace("PinHole", "KannalaBrandt8"),
-        ("a.yaml:3: Camera.type KannalaBrandt8", *FISHEYE, WHAT_HELPS),
-    ),
-    "Camera.bFishEye": Case(OURS + "Camera.bFishEye: 1\n", ("Camera.bFishEye 1", *FISHEYE)),
-    "Camera.model": Case(
-        texts.STELLA.replace("perspective", "fisheye"), ("Camera.model fisheye", *FISHEYE)
-    ),
-    "fisheye pair": Case(
-        texts.STELLA_STEREO.replace('  model: "perspective"\n  K_', '  model: "fisheye"\n  K_'),
-        ("StereoRectifier.model fisheye", *FISHEYE, "--baseline METRES"),
-        sensor="stereo",
-    ),
+    # ---- other lenses --------------------------------------------------------------------------
     "all around": Case(
         texts.STELLA.replace("perspective", "equirectangular"),
         ("images of all directions (equirectangular)", "Make pinhole images", WHAT_HELPS),
@@ -291,34 +237,8 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_file_is_refused_and_following_the_message_helps(
-    command: CommandLine, tmp_path: Path, name: str
-) -> None:
-    case = CASES[name]
-    Path("a.yaml").write_text(case.text)
-    done = command("settings", "check", "a.yaml", "--sensor", case.sensor)
-    expect_refused(done, "a.yaml", *case.told)
-    assert "remove" not in done.err
-    assert "allow" not in done.err.replace("allowed", "")
-    assert Path("a.yaml").read_text() == case.text
-    if case.right is None:
-        return
-    followed = case.right(case.text)
-    assert followed != case.text
-    Path("a.yaml").write_text(followed)
-    assert case.check is not None
-    assert case.check(Settings.load("a.yaml", case.sensor))
-    assert command("settings", "check", "a.yaml", "--sensor", case.sensor).code == 0
-
-
-def test_the_line_for_undistorted_images_makes_settings(command: CommandLine) -> None:
-    """What a fisheye file is answered with works as it stands, but for the numbers."""
-    Path("a.yaml").write_text(CASES["four radial"].text)
-    line = command("settings", "check", "a.yaml").err.strip().splitlines()[-1].split()[1:]
-    numbers = {"FX": "300", "FY": "301", "CX": "160", "CY": "120"}
-    done = command(*(numbers.get(word, word) for word in line))
-    assert done.code == 0, done.err
-    assert Settings.load("my.yaml", "mono").camera.fy == 301
+def test_a_file_is_refused_and_following_the_message_helps(command: CommandLine, name: str) -> None:
+    refuse_and_follow(command, CASES[name])
 
 
 # ---- a run says what is doubtful -----------------------------------------------------------------
@@ -384,8 +304,3 @@ def test_a_lens_that_cannot_be(command: CommandLine, stereo: Path) -> None:
     assert done.err.count("tangential distortion p1 -0.25") == 1, done.err
     warnings = json.loads(Path("r/report.json").read_text())["warnings"]
     assert any("k3, k4 of a fisheye lens" in text for text in warnings)
-
-
-def test_a_fisheye_is_refused_by_a_run(command: CommandLine, stereo: Path) -> None:
-    (stereo / "settings.yaml").write_text(OURS_DEPTH + FOUR)
-    expect_refused(run(command, stereo, "stereo"), "settings.yaml", *FISHEYE)

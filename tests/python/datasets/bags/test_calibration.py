@@ -86,6 +86,27 @@ def test_one_camera(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("D", "expected"),
+    [
+        ((0.02, -0.01, 0.004, -0.001), True),
+        ((0.02, -0.01, 0.004, -0.001, 0.0), True),
+        ((0.02, -0.01, 0.004, 0.1, 0.1), False),
+    ],
+)
+def test_one_fisheye_camera(tmp_path: Path, D: tuple[float, ...], expected: bool) -> None:
+    info = {**raw_pair()["left"], "model": "equidistant", "D": D}
+    made = messages("image_raw", {"camera": info})
+    sequence = BagSequence(bags.write(tmp_path / "b", "rosbag1", made))
+    if not expected:
+        with pytest.raises(orb.DatasetError, match=r"equidistant needs the 4 numbers k1, k2, k3"):
+            _ = sequence.settings
+        return
+    camera = sequence.settings.camera
+    assert (camera.model, camera.lens) == ("kannala_brandt", D[:4])
+    assert (camera.fx, camera.cy, camera.is_distorted) == (200, 118, False)
+
+
+@pytest.mark.parametrize(
     ("name", "left", "right", "message"),
     [
         ("image_raw", {}, {}, "do not tell the distance of the two cameras"),

@@ -135,6 +135,14 @@ def test_settings_of_the_user_say_where_pixels_are(tmp_path: Path) -> None:
     assert registered_error(BagSequence(bag, settings=settings), 115) < 0.02
 
 
+def test_depth_of_another_camera_is_not_registered_to_a_fisheye(tmp_path: Path) -> None:
+    camera = orb.CameraSettings(70, 70, 47.5, 35.5, model="fov", lens=(0.9,))
+    settings = orb.settings.settings_for_camera(camera, "rgbd", depth_factor=1000)
+    bag = rgbd(tmp_path, colour_f=None, more=(edge(),))
+    with pytest.raises(orb.DatasetError, match=r"registered to a fisheye camera; .*--sensor mono"):
+        BagSequence(bag, settings=settings)
+
+
 @pytest.mark.parametrize("layout", ["viewer", "sdk"])
 def test_recordings_of_the_sdk(tmp_path: Path, layout: str) -> None:
     depth, grey = [DEPTH, DEPTH], [GREY, GREY]
