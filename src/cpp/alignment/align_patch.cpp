@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Written from S. Baker, I. Matthews, "Lucas-Kanade 20 years on", IJCV 2004 (inverse compositional)
+// and C. Forster et al., "SVO", T-RO 2017 (the warped patch moves over the image).
+//
+// Gain and offset are solved for exactly in every step: gradients and values of the patch are made
+// orthogonal to what gain and offset can explain, so that a step needs three sums of products.
+#include "alignment/align_patch.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "alignment/smooth.hpp"
+
+namespace orbslam {
+namespace {
+
+constexpr int kHalf = 4;
+constexpr int kSide = 2 * kHalf + 1;
+constexpr int kPixels = kSide * kSide;
+constexpr int kParameters = 4;  // two of the position, gain, offset
+constexpr int kColumns = 12;    // of a row with its padding: whole vectors of four numbers
+constexpr int kVectors = kColumns / 4;
+
+// Pixels that the patch can reach on each side of the pixel nearest to the start: the shift, the
+// rounding of the start, and the neighbour for interpolation.
+constexpr int kReach = kHalf + static_cast<int>(AlignmentOptions::kMostShift) + 2;
+constexpr int kWindow = 2 * kReach + 1;
+constexpr int kStride = 28;  // of a row of the window: loads of padding stay in it
+
+// Values have the unit 1/16 grey value (smooth.hpp).
+constexpr double kGrey = 16;
+/// Variance of rounding to whole grey values, what is left of it after smoothing, in both images.
+constexpr double kRounding = 2.0 / 12.0 * (6.0 / 16.0) * (6.0 / 16.0);
+/// Least mean square of the gradient in its weakest direction [grey values^2 / pixel^2].
+constexpr double kLeastGradient = 1.0;
+/// Least share of the weakest direction in the strongest one.
+constexpr double kLeastShare = 1e-3;
+
+/// Four numbers, which the compiler puts into one register of every vector unit.
+using Four = float __attribute__((vector_size(16)));
+
+struct Plane {
+  alignas(16) Four rows[kSide][kVectors];
+
+  float& at(int y, int x) { return reinterpret_cast<float*>(rows[y])[x]; }
+};
+
+Four load(const float* from) {
+  Four four;
+  __builtin_memcpy(&four, from, sizeof(four));
+  return four;
+}
+
+/// In a fixed order.
+double total(const Four (&sums)[kVectors]) {
+  const Four all = (sums[0] + sums[1]) + sums[2];
+  return (static_cast<double>(all[0]) + all[1]) + (static_cast<double>(all[2]) + all[3]);
+}
+
+double dot(const Plane& a, const Plane& b) {
+  Four sums[kVectors] = {};
+  for (int y = 0; y < kSide; ++y) {
+    for (int k = 0; k < kVectors; ++k) sums[k] += a.rows[y][k] * b.rows[y][k];
+  }
+  return total(sums);
+}
+
+/// Ones where there are pixels, zeros in the padding.
+const Plane& ones() {
+  static const Plane plane = [] {
+    Plane made{};
+    for (int y = 0; y < kSide; ++y) std::fill_n(&made.at(y, 0), kSide, 1.0F);
+    return made;
+  }();
+  return plane;
+}
+
+void subtract(Plane& from, double factor, const Plane& what) {
+  const auto f = static_cast<float>(factor);
+  const Four all = {f, f, f, f};
+  for (int y = 0; y < kSide; ++y) {
+    for (int k = 0; k < kVectors; ++k) from.rows[y][k] -= all * what.rows[y][k];
+  }
+}
+
+/// Multiplies by the correlation matrix of noise that the smoothing leaves of white noise: that of
+/// two pixels is (1 4 6 4 1) / 6 of their distance in x times that in y.
+void correlate(const Plane& in, Plane& out) {
+  constexpr int kFar = 2;
+  const auto weigh = [](const Four& a, const Four& b, const Four& c, const Four& d, const Four& e) {
+    constexpr float near = 4.0F / 6.0F, far = 1.0F / 6.0F;
+    return c + near * (b + d) + far * (a + e);
+  };
+  Four down[kSide + 2 * kFar][kVectors] = {};
+  for (int y = 0; y < kSide; ++y) {
+    for (int k = 0; k < kVectors; ++k) down[y + kFar][k] = in.rows[y][k];
+  }
+  for (int y = 0; y < kSide; ++y) {
+    float row[kColumns + 2 * kFar] = {};
+    for (int k = 0; k < kVectors; ++k) {
+      const Four sum = weigh(down[y][k], down[y + 1][k], down[y + 2][k], down[y + 3][k], down[y + 4][k]);
+      __builtin_memcpy(row + kFar + 4 * k, &sum, sizeof(sum));
+    }
+    for (int k = 0; k < kVectors; ++k) {
+      const float* at = row + 4 * k;
+      out.rows[y][k] = weigh(load(at), load(at + 1), load(at + 2), load(at + 3), load(at + 4));
+    }
+  }
+}
+
+/// The patch as the image should show it, with what the steps need.
+struct Template {
+  Plane values;        // mean 0
+  Plane gx, gy;        // gradients, orthogonal to constant and values
+  double square = 0;   // of the values
+  Eigen::Matrix2d H;   // of the gradients
+  Eigen::Matrix2d H1;  // inverse
+};
+
+/// Samples the reference, with a border of one pixel for gradients. False when it does not reach.
+bool warp(const ReferencePatch& reference, const Eigen::Matrix2d& A,
+          float (&out)[kSide + 2][kSide + 2]) {
+  const Eigen::Matrix2f back = A.inverse().cast<float>();
+  constexpr float kLast = ReferencePatch::kSize - 1;
+  const Eigen::Vector2f centre =
+      reference.fraction + Eigen::Vector2f::Constant(ReferencePatch::kCentre);
+  const Eigen::Vector2f most = back.cwiseAbs() * Eigen::Vector2f::Constant(kHalf + 1);
+  const bool inside = (centre - most).minCoeff() >= 0 && (centre + most).maxCoeff() < kLast;
+  if (!inside) return false;  // also of NaN
+  for (int j = 0; j < kSide + 2; ++j) {
+    for (int i = 0; i < kSide + 2; ++i) {
+      const auto dx = static_cast<float>(i - kHalf - 1), dy = static_cast<float>(j - kHalf - 1);
+      const float x = centre.x() + (back(0, 0) * dx + back(0, 1) * dy);
+      const float y = centre.y() + (back(1, 0) * dx + back(1, 1) * dy);
+      const auto column = static_cast<std::size_t>(x), line = static_cast<std::size_t>(y);
+      const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(line);
+      const auto &above = reference.values[line], &below = reference.values[line + 1];
+      const auto a = static_cast<float>(above[column]), b = static_cast<float>(above[column + 1]);
+      const auto c = static_cast<float>(below[column]), d = static_cast<float>(below[column + 1]);
+      const float upper = a + fx * (b - a), lower = c + fx * (d - c);
+      out[j][i] = upper + fy * (lower - upper);
+    }
+  }
+  return true;
+}
+
+bool is_flat(const Eigen::Matrix2d& H) {
+  const double half = 0.5 * H.trace();
+  const double spread = std::hypot(0.5 * (H(0, 0) - H(1, 1)), H(0, 1));
+  const double least = half - spread, most = half + spread;
+  return !(least > kLeastGradient * kGrey * kGrey * kPixels && least > kLeastShare * most);
+}
+
+AlignmentFailure make_template(const ReferencePatch& reference, const Eigen::Matrix2d& A,
+                               Template& made) {
+  float grey[kSide + 2][kSide + 2];
+  if (!warp(reference, A, grey)) return AlignmentFailure::kOutside;
+  made.values = made.gx = made.gy = Plane{};
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      made.values.at(y, x) = grey[y + 1][x + 1];
+      made.gx.at(y, x) = 0.5F * (grey[y + 1][x + 2] - grey[y + 1][x]);
+      made.gy.at(y, x) = 0.5F * (grey[y + 2][x + 1] - grey[y][x + 1]);
+    }
+  }
+  for (Plane* plane : {&made.values, &made.gx, &made.gy}) {
+    subtract(*plane, dot(*plane, ones()) / kPixels, ones());
+  }
+  made.square = dot(made.values, made.values);
+  if (!(made.square > 0)) return AlignmentFailure::kFlat;
+  for (Plane* plane : {&made.gx, &made.gy}) {
+    subtract(*plane, dot(*plane, made.values) / made.square, made.values);
+  }
+  const double xy = dot(made.gx, made.gy);
+  made.H << dot(made.gx, made.gx), xy, xy, dot(made.gy, made.gy);
+  if (is_flat(made.H)) return AlignmentFailure::kFlat;
+  made.H1 = made.H.inverse();
+  return AlignmentFailure::kNone;
+}
+
+/// The part of the image that the patch can reach.
+class Window {
+ public:
+  /// Pixels beyond the border of the image repeat it; is_inside() tells what may be used.
+  Window(const cv::Mat& level, int x, int y)
+      : x_(x - kReach), y_(y - kReach), columns_(level.cols), rows_(level.rows) {
+    constexpr int kBytes = kWindow + 2;
+    const int left = x_ - 1, top = y_ - 1;
+    const bool whole =
+        left >= 0 && top >= 0 && left + kBytes <= level.cols && top + kBytes <= level.rows;
+    if (whole) {
+      fill(level.ptr<std::uint8_t>(top) + left, static_cast<std::ptrdiff_t>(level.step[0]));
+      return;
+    }
+    std::uint8_t bytes[kBytes][kBytes];
+    for (int j = 0; j < kBytes; ++j) {
+      const auto* row = level.ptr<std::uint8_t>(std::clamp(top + j, 0, level.rows - 1));
+      for (int i = 0; i < kBytes; ++i) bytes[j][i] = row[std::clamp(left + i, 0, level.cols - 1)];
+    }
+    fill(bytes[0], kBytes);
+  }
+
+  /// The patch at a position lies in the image.
+  bool is_inside(const Eigen::Vector2d& position) const {
+    return position.x() >= kHalf && position.x() < columns_ - 1 - kHalf && position.y() >= kHalf &&
+           position.y() < rows_ - 1 - kHalf;
+  }
+
+  /// Calls visit(y, k, values) with the interpolated values of the patch, four at a time. What it
+  /// gives for the padding is of no meaning.
+  template <class Visit>
+  void sample(const Eigen::Vector2d& position, const Visit& visit) const {
+    const double left = position.x() - kHalf, top = position.y() - kHalf;
+    const double column = std::floor(left), line = std::floor(top);
+    const auto fx = static_cast<float>(left - column), fy = static_cast<float>(top - line);
+    const float a = (1 - fx) * (1 - fy), b = fx * (1 - fy), c = (1 - fx) * fy, d = fx * fy;
+    const Four wa = {a, a, a, a}, wb = {b, b, b, b}, wc = {c, c, c, c}, wd = {d, d, d, d};
+    const int x = static_cast<int>(column) - x_, y = static_cast<int>(line) - y_;
+    for (int j = 0; j < kSide; ++j) {
+      const float* above = &grey_[static_cast<std::size_t>(y + j)][static_cast<std::size_t>(x)];
+      const float* below = above + kStride;
+      for (int k = 0; k < kVectors; ++k, above += 4, below += 4) {
+        visit(j, k, (wa * load(above) + wb * load(above + 1)) +
+                        (wc * load(below) + wd * load(below + 1)));
+      }
+    }
+  }
+
+ private:
+  void fill(const std::uint8_t* bytes, std::ptrdiff_t stride) {
+    alignment::smooth<kWindow>(bytes, stride, grey_);
+    for (auto& row : grey_) std::fill(row.begin() + kWindow, row.end(), 0.0F);
+  }
+
+  int x_, y_, columns_, rows_;
+  std::array<std::array<float, kStride>, kWindow> grey_;
+};
+static_assert(2 * kReach + 1 - kSide + kColumns + 1 <= kStride);
+
+/// Gain, correlation and information where the patch has come to rest.
+void judge(const Template& patch, const Window& window, PatchAlignment& result) {
+  Plane seen{};
+  window.sample(result.position, [&](int y, int k, const Four& values) {
+    seen.rows[y][k] = values * ones().rows[y][k];
+  });
+  subtract(seen, dot(seen, ones()) / kPixels, ones());
+  const double square = dot(seen, seen), product = dot(seen, patch.values);
+  result.gain = product / patch.square;
+  result.correlation = square > 0 ? product / std::sqrt(square * patch.square) : 0;
+  subtract(seen, result.gain, patch.values);
+  const double floor = kRounding * kGrey * kGrey;
+  const double variance = std::max(dot(seen, seen) / (kPixels - kParameters), floor);
+  Plane x, y;
+  correlate(patch.gx, x);
+  correlate(patch.gy, y);
+  const double xy = 0.5 * (dot(x, patch.gy) + dot(y, patch.gx));
+  Eigen::Matrix2d scatter;  // of the sums in a step, over the variance of a pixel
+  scatter << dot(x, patch.gx), xy, xy, dot(y, patch.gy);
+  result.information = (result.gain * result.gain / variance) * patch.H * scatter.inverse() * patch.H;
+}
+
+/// One step; false when there is none.
+bool step(const Template& patch, const Window& window, const Eigen::Vector2d& position,
+          Eigen::Vector2d& move) {
+  Four x[kVectors] = {}, y[kVectors] = {}, value[kVectors] = {};
+  window.sample(position, [&](int j, int k, const Four& seen) {
+    x[k] += patch.gx.rows[j][k] * seen;
+    y[k] += patch.gy.rows[j][k] * seen;
+    value[k] += patch.values.rows[j][k] * seen;
+  });
+  const double gain = total(value) / patch.square;
+  if (!(gain > 0)) return false;
+  move = patch.H1 * Eigen::Vector2d(total(x), total(y)) * (-1 / gain);
+  return true;
+}
+
+bool is_usable(const cv::Mat& level, const Eigen::Vector2d& start, const Eigen::Matrix2d& A) {
+  return start.allFinite() && A.allFinite() && std::abs(A.determinant()) > 1e-6 && start.x() >= 0 &&
+         start.y() >= 0 && start.x() < level.cols && start.y() < level.rows;
+}
+
+}  // namespace
+
+PatchAlignment align_patch(const ReferencePatch& reference, const Eigen::Matrix2d& A,
+                           const cv::Mat& level, const Eigen::Vector2d& start,
+                           const AlignmentOptions& options) {
+  PatchAlignment result;
+  if (!is_usable(level, start, A)) return result;
+  Template patch;
+  result.failure = make_template(reference, A, patch);
+  if (result.failure != AlignmentFailure::kNone) return result;
+  const Window window(level, static_cast<int>(std::lround(start.x())),
+                      static_cast<int>(std::lround(start.y())));
+  const double most = std::min(options.max_shift, AlignmentOptions::kMostShift);
+  Eigen::Vector2d move;
+  result.position = start;
+  bool converged = false;
+  while (!converged) {
+    if (!window.is_inside(result.position)) {
+      result.failure = AlignmentFailure::kOutside;
+      return result;
+    }
+    result.failure = AlignmentFailure::kNotConverged;
+    if (result.iterations >= options.iterations) return result;
+    ++result.iterations;
+    if (!step(patch, window, result.position, move)) return result;
+    result.position += move;
+    // Negated, so that NaN ends it.
+    if (!((result.position - start).norm() <= most)) return result;
+    converged = move.norm() < options.converged;
+  }
+  if (!window.is_inside(result.position)) {
+    result.failure = AlignmentFailure::kOutside;
+    return result;
+  }
+  judge(patch, window, result);
+  const bool alike = result.correlation >= options.min_correlation;
+  result.failure = alike ? AlignmentFailure::kNone : AlignmentFailure::kLowCorrelation;
+  return result;
+}
+
+}  // namespace orbslam
