@@ -25,16 +25,15 @@ struct Pairs {
     const Eigen::Matrix2d back = A.inverse();
     for (unsigned i = 0; i < kPairs; ++i) {
       const testing::Texture texture(i + 1, 7);
-      images.push_back(testing::picture(
-          texture, [](const Eigen::Vector2d& p) { return p; }, {1, 0, 2, i}));
+      images.push_back(
+          testing::picture(texture, [](const Eigen::Vector2d& p) { return p; }, {1, 0, 2, i}));
       cut_patch(images.back(), kCentre, references[i]);
       const Eigen::Vector2d shift(0.7, -0.6);
-      moved.push_back(testing::picture(
-          texture,
-          [&](const Eigen::Vector2d& p) -> Eigen::Vector2d {
-            return kCentre + back * (p - kCentre - shift);
-          },
-          {1.1, 4, 2, i + 1000}));
+      moved.push_back(testing::picture(texture,
+                                       [&](const Eigen::Vector2d& p) -> Eigen::Vector2d {
+                                         return kCentre + back * (p - kCentre - shift);
+                                       },
+                                       {1.1, 4, 2, i + 1000}));
     }
   }
 };
@@ -50,8 +49,7 @@ void align_one_patch(benchmark::State& state) {
   std::size_t i = 0;
   double steps = 0, aligned = 0, n = 0;
   for (auto _ : state) {
-    const PatchAlignment found =
-        align_patch(made.references[i], made.A, made.moved[i], kCentre);
+    const PatchAlignment found = align_patch(made.references[i], made.A, made.moved[i], kCentre);
     steps += found.iterations;
     aligned += found.ok() ? 1 : 0;
     n += 1;

@@ -6,6 +6,7 @@
 // orthogonal to what gain and offset can explain, so that a step needs three sums of products.
 #include "alignment/align_patch.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,8 +19,7 @@ namespace {
 constexpr int kHalf = 4;
 constexpr int kSide = 2 * kHalf + 1;
 constexpr int kPixels = kSide * kSide;
-constexpr int kParameters = 4;  // two of the position, gain, offset
-constexpr int kColumns = 12;    // of a row with its padding: whole vectors of four numbers
+constexpr int kColumns = 12;  // of a row with its padding: whole vectors of four numbers
 constexpr int kVectors = kColumns / 4;
 
 // Pixels that the patch can reach on each side of the pixel nearest to the start: the shift, the
@@ -30,8 +30,14 @@ constexpr int kStride = 28;  // of a row of the window: loads of padding stay in
 
 // Values have the unit 1/16 grey value (smooth.hpp).
 constexpr double kGrey = 16;
-/// Variance of rounding to whole grey values, what is left of it after smoothing, in both images.
-constexpr double kRounding = 2.0 / 12.0 * (6.0 / 16.0) * (6.0 / 16.0);
+/// Of white noise, smoothing and interpolation leave this share of the variance, in one direction.
+constexpr double kLeftOfNoise = 0.316;
+/// Correlation of that noise between a pixel and the two next to it, in one direction.
+constexpr float kNear = 0.74F, kFar = 0.29F;
+/// Pixels less what such noise hides in position, gain and offset.
+constexpr double kFreedom = kPixels - 16;
+/// Variance of rounding to whole grey values in both images, after smoothing.
+constexpr double kRounding = 2.0 / 12.0 * kLeftOfNoise * kLeftOfNoise;
 /// Least mean square of the gradient in its weakest direction [grey values^2 / pixel^2].
 constexpr double kLeastGradient = 1.0;
 /// Least share of the weakest direction in the strongest one.
@@ -39,6 +45,18 @@ constexpr double kLeastShare = 1e-3;
 
 /// Four numbers, which the compiler puts into one register of every vector unit.
 using Four = float __attribute__((vector_size(16)));
+
+/// Weights of three pixels: the quadratic B-spline. Its smoothing is the same at all fractions of a
+/// pixel, that of linear interpolation is not and would pull positions.
+struct Spline {
+  /// `t`: position minus that of the middle pixel, -0.5 to 0.5.
+  explicit Spline(float t)
+      : before(0.5F * (0.5F - t) * (0.5F - t)),
+        at(0.75F - t * t),
+        after(0.5F * (0.5F + t) * (0.5F + t)) {}
+
+  float before, at, after;
+};
 
 struct Plane {
   alignas(16) Four rows[kSide][kVectors];
@@ -52,10 +70,12 @@ Four load(const float* from) {
   return four;
 }
 
+Four all(float value) { return Four{value, value, value, value}; }
+
 /// In a fixed order.
 double total(const Four (&sums)[kVectors]) {
-  const Four all = (sums[0] + sums[1]) + sums[2];
-  return (static_cast<double>(all[0]) + all[1]) + (static_cast<double>(all[2]) + all[3]);
+  const Four sum = (sums[0] + sums[1]) + sums[2];
+  return (static_cast<double>(sum[0]) + sum[1]) + (static_cast<double>(sum[2]) + sum[3]);
 }
 
 double dot(const Plane& a, const Plane& b) {
@@ -77,30 +97,28 @@ const Plane& ones() {
 }
 
 void subtract(Plane& from, double factor, const Plane& what) {
-  const auto f = static_cast<float>(factor);
-  const Four all = {f, f, f, f};
+  const Four f = all(static_cast<float>(factor));
   for (int y = 0; y < kSide; ++y) {
-    for (int k = 0; k < kVectors; ++k) from.rows[y][k] -= all * what.rows[y][k];
+    for (int k = 0; k < kVectors; ++k) from.rows[y][k] -= f * what.rows[y][k];
   }
 }
 
-/// Multiplies by the correlation matrix of noise that the smoothing leaves of white noise: that of
-/// two pixels is (1 4 6 4 1) / 6 of their distance in x times that in y.
+/// Multiplies by the correlation matrix of smoothed white noise.
 void correlate(const Plane& in, Plane& out) {
-  constexpr int kFar = 2;
+  constexpr int kBorder = 2;
   const auto weigh = [](const Four& a, const Four& b, const Four& c, const Four& d, const Four& e) {
-    constexpr float near = 4.0F / 6.0F, far = 1.0F / 6.0F;
-    return c + near * (b + d) + far * (a + e);
+    return c + kNear * (b + d) + kFar * (a + e);
   };
-  Four down[kSide + 2 * kFar][kVectors] = {};
+  Four down[kSide + 2 * kBorder][kVectors] = {};
   for (int y = 0; y < kSide; ++y) {
-    for (int k = 0; k < kVectors; ++k) down[y + kFar][k] = in.rows[y][k];
+    for (int k = 0; k < kVectors; ++k) down[y + kBorder][k] = in.rows[y][k];
   }
   for (int y = 0; y < kSide; ++y) {
-    float row[kColumns + 2 * kFar] = {};
+    float row[kColumns + 2 * kBorder] = {};
     for (int k = 0; k < kVectors; ++k) {
-      const Four sum = weigh(down[y][k], down[y + 1][k], down[y + 2][k], down[y + 3][k], down[y + 4][k]);
-      __builtin_memcpy(row + kFar + 4 * k, &sum, sizeof(sum));
+      const Four sum =
+          weigh(down[y][k], down[y + 1][k], down[y + 2][k], down[y + 3][k], down[y + 4][k]);
+      __builtin_memcpy(row + kBorder + 4 * k, &sum, sizeof(sum));
     }
     for (int k = 0; k < kVectors; ++k) {
       const float* at = row + 4 * k;
@@ -122,24 +140,27 @@ struct Template {
 bool warp(const ReferencePatch& reference, const Eigen::Matrix2d& A,
           float (&out)[kSide + 2][kSide + 2]) {
   const Eigen::Matrix2f back = A.inverse().cast<float>();
-  constexpr float kLast = ReferencePatch::kSize - 1;
+  constexpr float kLast = ReferencePatch::kSize - 1.5F;
   const Eigen::Vector2f centre =
       reference.fraction + Eigen::Vector2f::Constant(ReferencePatch::kCentre);
   const Eigen::Vector2f most = back.cwiseAbs() * Eigen::Vector2f::Constant(kHalf + 1);
-  const bool inside = (centre - most).minCoeff() >= 0 && (centre + most).maxCoeff() < kLast;
+  const bool inside = (centre - most).minCoeff() >= 0.5F && (centre + most).maxCoeff() < kLast;
   if (!inside) return false;  // also of NaN
   for (int j = 0; j < kSide + 2; ++j) {
     for (int i = 0; i < kSide + 2; ++i) {
       const auto dx = static_cast<float>(i - kHalf - 1), dy = static_cast<float>(j - kHalf - 1);
       const float x = centre.x() + (back(0, 0) * dx + back(0, 1) * dy);
       const float y = centre.y() + (back(1, 0) * dx + back(1, 1) * dy);
-      const auto column = static_cast<std::size_t>(x), line = static_cast<std::size_t>(y);
-      const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(line);
-      const auto &above = reference.values[line], &below = reference.values[line + 1];
-      const auto a = static_cast<float>(above[column]), b = static_cast<float>(above[column + 1]);
-      const auto c = static_cast<float>(below[column]), d = static_cast<float>(below[column + 1]);
-      const float upper = a + fx * (b - a), lower = c + fx * (d - c);
-      out[j][i] = upper + fy * (lower - upper);
+      const auto column = static_cast<int>(x + 0.5F), line = static_cast<int>(y + 0.5F);
+      const Spline across(x - static_cast<float>(column)), down(y - static_cast<float>(line));
+      float sum[3];
+      for (int k = 0; k < 3; ++k) {
+        const std::uint16_t* row = &reference.values[static_cast<std::size_t>(line - 1 + k)]
+                                                    [static_cast<std::size_t>(column - 1)];
+        sum[k] = across.before * static_cast<float>(row[0]) +
+                 across.at * static_cast<float>(row[1]) + across.after * static_cast<float>(row[2]);
+      }
+      out[j][i] = down.before * sum[0] + down.at * sum[1] + down.after * sum[2];
     }
   }
   return true;
@@ -212,17 +233,21 @@ class Window {
   template <class Visit>
   void sample(const Eigen::Vector2d& position, const Visit& visit) const {
     const double left = position.x() - kHalf, top = position.y() - kHalf;
-    const double column = std::floor(left), line = std::floor(top);
-    const auto fx = static_cast<float>(left - column), fy = static_cast<float>(top - line);
-    const float a = (1 - fx) * (1 - fy), b = fx * (1 - fy), c = (1 - fx) * fy, d = fx * fy;
-    const Four wa = {a, a, a, a}, wb = {b, b, b, b}, wc = {c, c, c, c}, wd = {d, d, d, d};
-    const int x = static_cast<int>(column) - x_, y = static_cast<int>(line) - y_;
+    const double column = std::floor(left + 0.5), line = std::floor(top + 0.5);
+    const Spline across(static_cast<float>(left - column)), down(static_cast<float>(top - line));
+    const Four w0 = all(across.before), w1 = all(across.at), w2 = all(across.after);
+    const Four v0 = all(down.before), v1 = all(down.at), v2 = all(down.after);
+    const int x = static_cast<int>(column) - x_ - 1, y = static_cast<int>(line) - y_ - 1;
+    Four rows[kSide + 2][kVectors];
+    for (int j = 0; j < kSide + 2; ++j) {
+      const float* at = &grey_[static_cast<std::size_t>(y + j)][static_cast<std::size_t>(x)];
+      for (int k = 0; k < kVectors; ++k, at += 4) {
+        rows[j][k] = w0 * load(at) + w1 * load(at + 1) + w2 * load(at + 2);
+      }
+    }
     for (int j = 0; j < kSide; ++j) {
-      const float* above = &grey_[static_cast<std::size_t>(y + j)][static_cast<std::size_t>(x)];
-      const float* below = above + kStride;
-      for (int k = 0; k < kVectors; ++k, above += 4, below += 4) {
-        visit(j, k, (wa * load(above) + wb * load(above + 1)) +
-                        (wc * load(below) + wd * load(below + 1)));
+      for (int k = 0; k < kVectors; ++k) {
+        visit(j, k, v0 * rows[j][k] + v1 * rows[j + 1][k] + v2 * rows[j + 2][k]);
       }
     }
   }
@@ -250,14 +275,15 @@ void judge(const Template& patch, const Window& window, PatchAlignment& result) 
   result.correlation = square > 0 ? product / std::sqrt(square * patch.square) : 0;
   subtract(seen, result.gain, patch.values);
   const double floor = kRounding * kGrey * kGrey;
-  const double variance = std::max(dot(seen, seen) / (kPixels - kParameters), floor);
+  const double variance = std::max(dot(seen, seen) / kFreedom, floor);
   Plane x, y;
   correlate(patch.gx, x);
   correlate(patch.gy, y);
   const double xy = 0.5 * (dot(x, patch.gy) + dot(y, patch.gx));
   Eigen::Matrix2d scatter;  // of the sums in a step, over the variance of a pixel
   scatter << dot(x, patch.gx), xy, xy, dot(y, patch.gy);
-  result.information = (result.gain * result.gain / variance) * patch.H * scatter.inverse() * patch.H;
+  result.information =
+      (result.gain * result.gain / variance) * patch.H * scatter.inverse() * patch.H;
 }
 
 /// One step; false when there is none.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "alignment/patch_warp.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 

@@ -30,8 +30,7 @@ struct PatchWarp {
 };
 
 /// None when the camera does not see the point, or sees the plane edge-on.
-std::optional<PatchWarp> warp_of(const SurfacePatch& patch, const Camera& camera,
-                                 const Pose& T_cw);
+std::optional<PatchWarp> warp_of(const SurfacePatch& patch, const Camera& camera, const Pose& T_cw);
 
 /// The level of the other image in which the patch is as large as in the reference's level: of the
 /// scale nearest to that of the reference times the magnification, limited to the pyramid.

@@ -27,7 +27,8 @@ ReferencePatch reference_of(const cv::Mat& image, const Vector2d& at = kCentre) 
 }
 
 cv::Mat reference_image(const Texture& texture, const Look& look = {}) {
-  return picture(texture, [](const Vector2d& p) { return p; }, look);
+  return picture(
+      texture, [](const Vector2d& p) { return p; }, look);
 }
 
 /// Shows at `kCentre + shift` what the reference shows at kCentre, mapped by A around there.
@@ -68,10 +69,10 @@ TEST(AlignPatch, GainAndOffsetDoNotMatter) {
 }
 
 TEST(AlignPatch, WarpTurnsAndScalesThePatch) {
-  const Texture texture(4, 8);
+  const Texture texture(4);
   const ReferencePatch reference = reference_of(reference_image(texture));
   const Vector2d shift(-0.45, 0.2);
-  for (const auto& [angle, scale] : {std::pair(0.6, 1.0), {3.0, 0.95}, {-1.2, 1.09}, {0.0, 0.92}}) {
+  for (const auto& [angle, scale] : {std::pair(0.6, 1.0), {3.0, 0.95}, {-1.2, 1.09}, {0.0, 0.95}}) {
     const Matrix2d A = scale * Eigen::Rotation2Dd(angle).toRotationMatrix();
     const cv::Mat image = moved_image(texture, A, shift);
     const PatchAlignment found = align_patch(reference, A, image, kCentre);
@@ -84,22 +85,20 @@ TEST(AlignPatch, WarpTurnsAndScalesThePatch) {
 TEST(AlignPatch, InformationFitsTheScatterOfNoise) {
   double sum = 0;
   int n = 0;
-  for (unsigned seed = 1; seed <= 300; ++seed) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
     const Texture texture(1 + seed % 10);
     const ReferencePatch reference = reference_of(reference_image(texture, {1, 0, 5, seed}));
     const Vector2d shift(0.1 * (seed % 9) - 0.4, 0.1 * (seed % 7) - 0.3);
-    const cv::Mat image =
-        moved_image(texture, Matrix2d::Identity(), shift, {1, 0, 5, 1000 + seed});
+    const cv::Mat image = moved_image(texture, Matrix2d::Identity(), shift, {1, 0, 5, 1000 + seed});
     const PatchAlignment found = align_patch(reference, Matrix2d::Identity(), image, kCentre);
     if (!found.ok()) continue;
     const Vector2d error = found.position - kCentre - shift;
     sum += error.dot(found.information * error);
     ++n;
   }
-  EXPECT_GT(n, 250);
-  // A little more than 2: interpolation smooths what the residual is measured by.
-  EXPECT_GT(sum / n, 1.5);
-  EXPECT_LT(sum / n, 3.5);
+  EXPECT_GT(n, 180);
+  EXPECT_GT(sum / n, 1.6);
+  EXPECT_LT(sum / n, 2.6);
 }
 
 TEST(AlignPatch, FlatPatchesAndEdgesAreRefused) {
@@ -129,17 +128,20 @@ TEST(AlignPatch, FarShiftsDoNotConverge) {
 }
 
 TEST(AlignPatch, UnlikeImagesHaveALowCorrelation) {
-  const Texture texture(1, 8, 8);
+  const Texture texture(1);
   const ReferencePatch reference = reference_of(reference_image(texture));
-  int n_low = 0;
-  for (unsigned seed = 1; seed <= 40; ++seed) {
-    const cv::Mat image = reference_image(texture, {0.4, 0, 60, seed});
-    const PatchAlignment found = align_patch(reference, Matrix2d::Identity(), image, kCentre);
-    if (found.failure != AlignmentFailure::kLowCorrelation) continue;
-    EXPECT_LT(found.correlation, 0.8);
-    ++n_low;
-  }
-  EXPECT_GT(n_low, 20);
+  const cv::Mat image = reference_image(texture, {1, 0, 40, 1});
+  const PatchAlignment found = align_patch(reference, Matrix2d::Identity(), image, kCentre);
+  ASSERT_TRUE(found.ok());
+  AlignmentOptions options;
+  options.min_correlation = found.correlation;
+  EXPECT_TRUE(align_patch(reference, Matrix2d::Identity(), image, kCentre, options).ok());
+  options.min_correlation += 1e-6;
+  EXPECT_EQ(align_patch(reference, Matrix2d::Identity(), image, kCentre, options).failure,
+            AlignmentFailure::kLowCorrelation);
+  // The negative has the same edges.
+  const cv::Mat negative = reference_image(texture, {-1, 0, 0, 1});
+  EXPECT_FALSE(align_patch(reference, Matrix2d::Identity(), negative, kCentre).ok());
 }
 
 TEST(AlignPatch, BordersAndBadNumbersAreOutside) {
@@ -166,15 +168,14 @@ TEST(AlignPatch, WorksNearTheBorder) {
   const cv::Mat image = reference_image(texture);
   for (const Vector2d& at : {Vector2d(14.2, 20.6), Vector2d(20.1, 49.8)}) {
     const ReferencePatch reference = reference_of(image, at);
-    const Vector2d corner = at.y() < 32 ? Vector2d(at.x() - 9.6, at.y() - 15.4)
-                                        : Vector2d(at.x() - 15.1, at.y() + 8.4);
+    const Vector2d corner =
+        at.y() < 32 ? Vector2d(at.x() - 9.6, at.y() - 15.4) : Vector2d(at.x() - 15.1, at.y() + 8.4);
     const Vector2d move = corner - at;
-    const cv::Mat moved =
-        picture(texture, [&](const Vector2d& p) -> Vector2d { return p - move; });
+    const cv::Mat moved = picture(texture, [&](const Vector2d& p) -> Vector2d { return p - move; });
     const PatchAlignment found =
         align_patch(reference, Matrix2d::Identity(), moved, corner + Vector2d(0.6, -0.5));
     ASSERT_TRUE(found.ok()) << corner;
-    EXPECT_LT((found.position - corner).norm(), 0.02) << corner;
+    EXPECT_LT((found.position - corner).norm(), 0.03) << corner;
   }
 }
 
@@ -198,8 +199,8 @@ TEST(CutPatch, KeepsTheDistanceToTheBorder) {
   for (const Vector2d& good : {Vector2d(13, 13), Vector2d(50, 50), Vector2d(13, 50)}) {
     EXPECT_TRUE(cut_patch(image, good, patch)) << good;
   }
-  for (const Vector2d& bad : {Vector2d(12.9, 30), Vector2d(30, 50.1), Vector2d(kNan, 30),
-                              Vector2d(30, -1e12)}) {
+  for (const Vector2d& bad :
+       {Vector2d(12.9, 30), Vector2d(30, 50.1), Vector2d(kNan, 30), Vector2d(30, -1e12)}) {
     EXPECT_FALSE(cut_patch(image, bad, patch)) << bad;
   }
   EXPECT_FALSE(cut_patch(cv::Mat(), {0, 0}, patch));
