@@ -47,7 +47,7 @@ std::vector<double> judge(const BundleProblem& problem) {
     double squared = (Eigen::Vector2d(o.u, o.v) - pixel).squaredNorm();
     if (o.has_depth) {
       const double error = o.right_u - (pixel.x() - camera.model->bf() / p.z());
-      squared += error * error;
+      squared += static_cast<double>(o.right_factor) * (error * error);
     }
     const double whitened = static_cast<double>(o.inverse_sigma2) * squared;
     chi2.push_back(std::isfinite(whitened) ? whitened : std::numeric_limits<double>::infinity());

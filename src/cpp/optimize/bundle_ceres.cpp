@@ -144,6 +144,7 @@ class CeresMinimiser final : public BundleMinimiser, public ceres::EvaluationCal
       m.v = o.v;
       m.right_u = o.right_u;
       m.scale = usable[i] != 0 ? deviation(o) : 0.0;
+      m.right_scale = std::sqrt(static_cast<double>(o.right_factor));
     }
   }
 

@@ -26,7 +26,8 @@ CameraRow row_v(const BundleMeasurement& m) {
 }
 CameraRow row_right(const BundleMeasurement& m) {
   const CameraRow row = row_u(m);
-  return {row.a, 0, row.c + m.factor * m.view->camera().bf() * m.inverse_z * m.inverse_z};
+  const double c = row.c + m.factor * m.view->camera().bf() * m.inverse_z * m.inverse_z;
+  return {m.right_scale * row.a, 0, m.right_scale * c};
 }
 
 /// Derivative of the residual (minus the prediction) with respect to the six camera parameters.
@@ -106,8 +107,8 @@ double BundleMeasurement::evaluate() {
   const double predicted_u = k.fx * p_c[0] * inverse_z + k.cx;
   residual[0] = factor * (u - predicted_u);
   residual[1] = factor * (v - (k.fy * p_c[1] * inverse_z + k.cy));
-  residual[2] =
-      has_depth ? factor * (right_u - (predicted_u - view->camera().bf() * inverse_z)) : 0.0;
+  const double predicted_right = predicted_u - view->camera().bf() * inverse_z;
+  residual[2] = has_depth ? right_scale * (factor * (right_u - predicted_right)) : 0.0;
   if (huber == 0) return 0;
   const double q =
       residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];
