@@ -45,17 +45,19 @@ constexpr double kLeastShare = 1e-3;
 
 /// Four numbers, which the compiler puts into one register of every vector unit.
 using Four = float __attribute__((vector_size(16)));
+using FourInts = std::int32_t __attribute__((vector_size(16)));
 
 /// Weights of three pixels: the quadratic B-spline. Its smoothing is the same at all fractions of a
 /// pixel, that of linear interpolation is not and would pull positions.
+template <class Number>
 struct Spline {
   /// `t`: position minus that of the middle pixel, -0.5 to 0.5.
-  explicit Spline(float t)
+  explicit Spline(Number t)
       : before(0.5F * (0.5F - t) * (0.5F - t)),
         at(0.75F - t * t),
         after(0.5F * (0.5F + t) * (0.5F + t)) {}
 
-  float before, at, after;
+  Number before, at, after;
 };
 
 struct Plane {
@@ -136,32 +138,51 @@ struct Template {
   Eigen::Matrix2d H1;  // inverse
 };
 
-/// Samples the reference, with a border of one pixel for gradients. False when it does not reach.
-bool warp(const ReferencePatch& reference, const Eigen::Matrix2d& A,
-          float (&out)[kSide + 2][kSide + 2]) {
+/// The warped patch with a border of one pixel for gradients, and room to load whole vectors.
+using WarpedPatch = float[kSide + 2][kColumns + 4];
+
+Four grey_values(const std::uint16_t* from) {
+  using FourShorts = std::uint16_t __attribute__((vector_size(8)));
+  FourShorts four;
+  __builtin_memcpy(&four, from, sizeof(four));
+  return __builtin_convertvector(__builtin_convertvector(four, FourInts), Four);
+}
+
+/// Four pixels of the reference at the given places.
+void sample(const ReferencePatch& reference, const Four& x, const Four& y, float* out) {
+  const FourInts column = __builtin_convertvector(x + 0.5F, FourInts);
+  const FourInts line = __builtin_convertvector(y + 0.5F, FourInts);
+  const Spline<Four> across(x - __builtin_convertvector(column, Four));
+  const Spline<Four> down(y - __builtin_convertvector(line, Four));
+  for (int k = 0; k < 4; ++k) {
+    const std::uint16_t* at = &reference.values[static_cast<std::size_t>(line[k] - 1)]
+                                               [static_cast<std::size_t>(column[k] - 1)];
+    const Four sum = all(down.before[k]) * grey_values(at) +
+                     all(down.at[k]) * grey_values(at + ReferencePatch::kSize) +
+                     all(down.after[k]) * grey_values(at + 2 * ReferencePatch::kSize);
+    out[k] = across.before[k] * sum[0] + across.at[k] * sum[1] + across.after[k] * sum[2];
+  }
+}
+
+/// False when the reference does not reach that far.
+bool warp(const ReferencePatch& reference, const Eigen::Matrix2d& A, WarpedPatch& out) {
   const Eigen::Matrix2f back = A.inverse().cast<float>();
-  constexpr float kLast = ReferencePatch::kSize - 1.5F;
+  constexpr float kLast = ReferencePatch::kSize - 2.5F;  // four pixels are loaded at a time
   const Eigen::Vector2f centre =
       reference.fraction + Eigen::Vector2f::Constant(ReferencePatch::kCentre);
   const Eigen::Vector2f most = back.cwiseAbs() * Eigen::Vector2f::Constant(kHalf + 1);
   const bool inside = (centre - most).minCoeff() >= 0.5F && (centre + most).maxCoeff() < kLast;
   if (!inside) return false;  // also of NaN
+  // The last column is there to fill the vector.
+  constexpr Four kOffsets[kVectors] = {{-5, -4, -3, -2}, {-1, 0, 1, 2}, {3, 4, 5, 5}};
   for (int j = 0; j < kSide + 2; ++j) {
-    for (int i = 0; i < kSide + 2; ++i) {
-      const auto dx = static_cast<float>(i - kHalf - 1), dy = static_cast<float>(j - kHalf - 1);
-      const float x = centre.x() + (back(0, 0) * dx + back(0, 1) * dy);
-      const float y = centre.y() + (back(1, 0) * dx + back(1, 1) * dy);
-      const auto column = static_cast<int>(x + 0.5F), line = static_cast<int>(y + 0.5F);
-      const Spline across(x - static_cast<float>(column)), down(y - static_cast<float>(line));
-      float sum[3];
-      for (int k = 0; k < 3; ++k) {
-        const std::uint16_t* row = &reference.values[static_cast<std::size_t>(line - 1 + k)]
-                                                    [static_cast<std::size_t>(column - 1)];
-        sum[k] = across.before * static_cast<float>(row[0]) +
-                 across.at * static_cast<float>(row[1]) + across.after * static_cast<float>(row[2]);
-      }
-      out[j][i] = down.before * sum[0] + down.at * sum[1] + down.after * sum[2];
+    const auto dy = static_cast<float>(j - kHalf - 1);
+    const float x = centre.x() + back(0, 1) * dy, y = centre.y() + back(1, 1) * dy;
+    for (int k = 0; k < kVectors; ++k) {
+      const Four dx = kOffsets[k];
+      sample(reference, x + back(0, 0) * dx, y + back(1, 0) * dx, out[j] + 4 * k);
     }
+    std::fill_n(out[j] + kColumns, 4, 0.0F);
   }
   return true;
 }
@@ -175,14 +196,15 @@ bool is_flat(const Eigen::Matrix2d& H) {
 
 AlignmentFailure make_template(const ReferencePatch& reference, const Eigen::Matrix2d& A,
                                Template& made) {
-  float grey[kSide + 2][kSide + 2];
+  WarpedPatch grey;
   if (!warp(reference, A, grey)) return AlignmentFailure::kOutside;
-  made.values = made.gx = made.gy = Plane{};
   for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      made.values.at(y, x) = grey[y + 1][x + 1];
-      made.gx.at(y, x) = 0.5F * (grey[y + 1][x + 2] - grey[y + 1][x]);
-      made.gy.at(y, x) = 0.5F * (grey[y + 2][x + 1] - grey[y][x + 1]);
+    for (int k = 0; k < kVectors; ++k) {
+      const float *above = grey[y] + 4 * k, *at = grey[y + 1] + 4 * k, *below = grey[y + 2] + 4 * k;
+      const Four inside = ones().rows[y][k];
+      made.values.rows[y][k] = inside * load(at + 1);
+      made.gx.rows[y][k] = inside * (0.5F * (load(at + 2) - load(at)));
+      made.gy.rows[y][k] = inside * (0.5F * (load(below + 1) - load(above + 1)));
     }
   }
   for (Plane* plane : {&made.values, &made.gx, &made.gy}) {
@@ -234,7 +256,8 @@ class Window {
   void sample(const Eigen::Vector2d& position, const Visit& visit) const {
     const double left = position.x() - kHalf, top = position.y() - kHalf;
     const double column = std::floor(left + 0.5), line = std::floor(top + 0.5);
-    const Spline across(static_cast<float>(left - column)), down(static_cast<float>(top - line));
+    const Spline<float> across(static_cast<float>(left - column));
+    const Spline<float> down(static_cast<float>(top - line));
     const Four w0 = all(across.before), w1 = all(across.at), w2 = all(across.after);
     const Four v0 = all(down.before), v1 = all(down.at), v2 = all(down.after);
     const int x = static_cast<int>(column) - x_ - 1, y = static_cast<int>(line) - y_ - 1;
