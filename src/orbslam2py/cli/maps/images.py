@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orbslam2py.datasets import IterableSequence, open_input
+from orbslam2py.datasets import Sequence, open_input
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps import SavedMap
 from orbslam2py.runs.feeds import is_sequence
@@ -13,7 +13,7 @@ from orbslam2py.runs.feeds import is_sequence
 
 def open_images(
     saved: SavedMap, images: str, fps: float | None, times: Path | None, split: bool
-) -> IterableSequence:
+) -> Sequence:
     """Open what ``--images`` names, with the settings of the map.
 
     Raises

@@ -59,7 +59,9 @@ def test_errors_fall(room: Room) -> None:
     )
     assert record.used
     assert record.n_images == record.n_keyframes == len(room.contents.keyframes)
-    assert record.error_before == pytest.approx(np.median(reprojection_errors(room.contents)))
+    assert record.error_before == pytest.approx(
+        np.median(reprojection_errors(room.contents)), rel=1e-3
+    )
     assert record.error_after < 0.5 * record.error_before
     assert record.n_aligned > 0.8 * (record.n_observations - record.n_points)
     n_tried = record.n_aligned + sum(record.failures.values())
