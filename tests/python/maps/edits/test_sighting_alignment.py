@@ -159,10 +159,10 @@ def test_images_that_are_none(room: Room) -> None:
 
 @pytest.mark.parametrize("rounds", [0, -1, 1.5, "two"])
 def test_rounds_that_are_none(room: Room, rounds: object) -> None:
-    with pytest.raises(MapFileError, match="rounds is .*give a whole number of at least 1"):
+    with pytest.raises(MapFileError, match=r"rounds is .*give a whole number of at least 1"):
         align_sightings(room.contents, room.sequence, rounds=rounds)  # type: ignore[arg-type]
 
 
 def test_a_map_that_is_none(room: Room) -> None:
-    with pytest.raises(MapFileError, match="the map is 'a.orbmap'"):
+    with pytest.raises(MapFileError, match=r"the map is 'a\.orbmap'"):
         align_sightings("a.orbmap", room.sequence)  # type: ignore[arg-type]
