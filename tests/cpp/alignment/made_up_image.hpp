@@ -43,10 +43,11 @@ struct Look {
   unsigned seed = 1;                       ///< of the noise
 };
 
-/// An image of 64 x 64 pixels: pixel p shows texture(to_texture(p)).
+/// Pixel p of the image shows texture(to_texture(p)).
 template <class ToTexture>
-cv::Mat picture(const Texture& texture, const ToTexture& to_texture, const Look& look = {}) {
-  cv::Mat image(64, 64, CV_8UC1);
+cv::Mat picture(const Texture& texture, const ToTexture& to_texture, const Look& look = {},
+                cv::Size size = {64, 64}) {
+  cv::Mat image(size, CV_8UC1);
   std::mt19937 draw(look.seed);
   std::normal_distribution<double> noise(0, 1);
   for (int y = 0; y < image.rows; ++y) {
