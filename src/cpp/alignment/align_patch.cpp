@@ -89,13 +89,18 @@ double dot(const Plane& a, const Plane& b) {
 }
 
 /// Ones where there are pixels, zeros in the padding.
-const Plane& ones() {
-  static const Plane plane = [] {
-    Plane made{};
-    for (int y = 0; y < kSide; ++y) std::fill_n(&made.at(y, 0), kSide, 1.0F);
-    return made;
-  }();
-  return plane;
+constexpr Four kInside[kVectors] = {{1, 1, 1, 1}, {1, 1, 1, 1}, {1, 0, 0, 0}};
+
+/// Makes the mean zero; the padding must be zero and stays it.
+void subtract_mean(Plane& plane) {
+  Four sums[kVectors] = {};
+  for (int y = 0; y < kSide; ++y) {
+    for (int k = 0; k < kVectors; ++k) sums[k] += plane.rows[y][k];
+  }
+  const Four mean = all(static_cast<float>(total(sums) / kPixels));
+  for (int y = 0; y < kSide; ++y) {
+    for (int k = 0; k < kVectors; ++k) plane.rows[y][k] -= mean * kInside[k];
+  }
 }
 
 void subtract(Plane& from, double factor, const Plane& what) {
@@ -115,15 +120,18 @@ void correlate(const Plane& in, Plane& out) {
   for (int y = 0; y < kSide; ++y) {
     for (int k = 0; k < kVectors; ++k) down[y + kBorder][k] = in.rows[y][k];
   }
+  // All rows are written before the first is read: a load that spans two stores waits for both.
+  float rows[kSide][kColumns + 2 * kBorder] = {};
   for (int y = 0; y < kSide; ++y) {
-    float row[kColumns + 2 * kBorder] = {};
     for (int k = 0; k < kVectors; ++k) {
       const Four sum =
           weigh(down[y][k], down[y + 1][k], down[y + 2][k], down[y + 3][k], down[y + 4][k]);
-      __builtin_memcpy(row + kBorder + 4 * k, &sum, sizeof(sum));
+      __builtin_memcpy(rows[y] + kBorder + 4 * k, &sum, sizeof(sum));
     }
+  }
+  for (int y = 0; y < kSide; ++y) {
     for (int k = 0; k < kVectors; ++k) {
-      const float* at = row + 4 * k;
+      const float* at = rows[y] + 4 * k;
       out.rows[y][k] = weigh(load(at), load(at + 1), load(at + 2), load(at + 3), load(at + 4));
     }
   }
@@ -201,14 +209,14 @@ AlignmentFailure make_template(const ReferencePatch& reference, const Eigen::Mat
   for (int y = 0; y < kSide; ++y) {
     for (int k = 0; k < kVectors; ++k) {
       const float *above = grey[y] + 4 * k, *at = grey[y + 1] + 4 * k, *below = grey[y + 2] + 4 * k;
-      const Four inside = ones().rows[y][k];
+      const Four inside = kInside[k];
       made.values.rows[y][k] = inside * load(at + 1);
       made.gx.rows[y][k] = inside * (0.5F * (load(at + 2) - load(at)));
       made.gy.rows[y][k] = inside * (0.5F * (load(below + 1) - load(above + 1)));
     }
   }
   for (Plane* plane : {&made.values, &made.gx, &made.gy}) {
-    subtract(*plane, dot(*plane, ones()) / kPixels, ones());
+    subtract_mean(*plane);
   }
   made.square = dot(made.values, made.values);
   if (!(made.square > 0)) return AlignmentFailure::kFlat;
@@ -289,10 +297,9 @@ static_assert(2 * kReach + 1 - kSide + kColumns + 1 <= kStride);
 /// Gain, correlation and information where the patch has come to rest.
 void judge(const Template& patch, const Window& window, PatchAlignment& result) {
   Plane seen{};
-  window.sample(result.position, [&](int y, int k, const Four& values) {
-    seen.rows[y][k] = values * ones().rows[y][k];
-  });
-  subtract(seen, dot(seen, ones()) / kPixels, ones());
+  window.sample(result.position,
+                [&](int y, int k, const Four& values) { seen.rows[y][k] = values * kInside[k]; });
+  subtract_mean(seen);
   const double square = dot(seen, seen), product = dot(seen, patch.values);
   result.gain = product / patch.square;
   result.correlation = square > 0 ? product / std::sqrt(square * patch.square) : 0;
