@@ -62,8 +62,6 @@ struct Spline {
 
 struct Plane {
   alignas(16) Four rows[kSide][kVectors];
-
-  float& at(int y, int x) { return reinterpret_cast<float*>(rows[y])[x]; }
 };
 
 Four load(const float* from) {
