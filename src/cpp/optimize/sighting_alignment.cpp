@@ -32,10 +32,10 @@ void check_image(const cv::Mat& image, const Camera& camera, KeyFrameId keyframe
                  const char* which) {
   const ImageSize size = camera.image_size();
   if (image.type() == CV_8UC1 && image.cols == size.width && image.rows == size.height) return;
-  throw ImageError(std::string("the ") + which + " image of keyframe " +
-                   std::to_string(keyframe.value) + " has " + std::to_string(image.cols) + " x " +
-                   std::to_string(image.rows) + " pixels, but its camera has " +
-                   std::to_string(size.width) + " x " + std::to_string(size.height) +
+  throw ImageError(std::string(which) + " of keyframe " + std::to_string(keyframe.value) + " has " +
+                   std::to_string(image.cols) + " x " + std::to_string(image.rows) +
+                   " pixels, but its camera has " + std::to_string(size.width) + " x " +
+                   std::to_string(size.height) +
                    "; give the 8-bit grey images that the map was made of");
 }
 
@@ -91,7 +91,7 @@ Eigen::Vector2f SightingAlignment::raw_of(std::size_t observation) const {
 void SightingAlignment::take_references(KeyFrameId keyframe, const cv::Mat& grey) {
   const std::uint32_t camera = camera_of(keyframe);
   const Frame& frame = *frames_[camera];
-  check_image(grey, *frame.camera, keyframe, "left");
+  check_image(grey, *frame.camera, keyframe, "the image");
   const ImagePyramid images = build_pyramid(grey, *frame.scales);
   for (const std::uint32_t i : seen_by_[camera]) {
     Point& point = points_[bundle_.problem.observations[i].point];
@@ -120,10 +120,10 @@ void SightingAlignment::begin_round() {
 void SightingAlignment::align(KeyFrameId keyframe, const cv::Mat& grey, const cv::Mat& right) {
   const std::uint32_t camera = camera_of(keyframe);
   const Frame& frame = *frames_[camera];
-  check_image(grey, *frame.camera, keyframe, "left");
+  check_image(grey, *frame.camera, keyframe, "the image");
   Pyramids images{build_pyramid(grey, *frame.scales), {}};
   if (!right.empty()) {
-    check_image(right, *frame.camera, keyframe, "right");
+    check_image(right, *frame.camera, keyframe, "the right image");
     images.right = build_pyramid(right, *frame.scales);
   }
   const std::vector<std::uint32_t>& seen = seen_by_[camera];
