@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
+__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_patch', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -2486,6 +2486,216 @@ class MonocularMap:
         """
         Of the bundle adjustment.
         """
+class AlignmentFailure:
+    """
+    Why a patch was not aligned.
+
+    Members:
+
+      NONE : It was.
+
+      OUTSIDE : Patch or image do not reach that far, or a number is not finite.
+
+      FLAT : No texture, or texture in one direction only.
+
+      NOT_CONVERGED : It moved too far, or did not come to rest.
+
+      LOW_CORRELATION : It came to rest where the image is another one.
+    """
+    FLAT: typing.ClassVar[AlignmentFailure]
+    LOW_CORRELATION: typing.ClassVar[AlignmentFailure]
+    NONE: typing.ClassVar[AlignmentFailure]
+    NOT_CONVERGED: typing.ClassVar[AlignmentFailure]
+    OUTSIDE: typing.ClassVar[AlignmentFailure]
+    __members__: typing.ClassVar[dict[str, AlignmentFailure]]
+    @typing.overload
+    def __eq__(self, other: AlignmentFailure) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: AlignmentFailure) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class AlignmentOptions:
+    """
+    How align_patch works.
+    """
+    def __init__(self, iterations: typing.SupportsInt | typing.SupportsIndex = 15, max_shift: typing.SupportsFloat | typing.SupportsIndex = 3.0, min_correlation: typing.SupportsFloat | typing.SupportsIndex = 0.8, converged: typing.SupportsFloat | typing.SupportsIndex = 0.01) -> None:
+        ...
+    @property
+    def converged(self) -> float:
+        """
+        A step shorter than that is the last one, pixels.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps at most.
+        """
+    @property
+    def max_shift(self) -> float:
+        """
+        From the start, pixels of the level; at most 4.
+        """
+    @property
+    def min_correlation(self) -> float:
+        """
+        Of the grey values, 0 to 1.
+        """
+class PatchAlignment:
+    """
+    What align_patch found.
+    """
+    @property
+    def correlation(self) -> float:
+        """
+        Of the grey values, -1 to 1.
+        """
+    @property
+    def failure(self) -> AlignmentFailure:
+        """
+        Why not.
+        """
+    @property
+    def gain(self) -> float:
+        """
+        Contrast of the image over that of the reference.
+        """
+    @property
+    def information(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 2]"]:
+        """
+        (2, 2) inverse covariance of the position, pixels^-2.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Steps.
+        """
+    @property
+    def ok(self) -> bool:
+        """
+        It was aligned.
+        """
+    @property
+    def position(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        (2,) pixels of the image.
+        """
+class AlignmentNoise:
+    """
+    Noise of aligned sightings.
+    """
+    @property
+    def deviation(self) -> float:
+        """
+        Median standard deviation, so scaled, pixels of the level.
+        """
+    @property
+    def factor(self) -> float:
+        """
+        Standard deviation over that which the patches give.
+        """
+class SightingAlignment:
+    """
+    Full bundle adjustment with sightings that are aligned to each other.
+
+    Order: take_references() for all images; then rounds of begin_round(), align() for all
+    images, weigh() and solve(); at last commit(). The map must not change meanwhile.
+    """
+    def __init__(self, map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1, options: AlignmentOptions = ...) -> None:
+        ...
+    def align(self, keyframe: int, image: numpy.ndarray, right: typing.Any = None) -> None:
+        """
+        Align the sightings in a keyframe, and in the right image of a rectified pair.
+        """
+    def begin_round(self) -> None:
+        """
+        Forget the last round; compute patches by the present poses.
+        """
+    def commit(self, map: Map) -> FullBundleCommit:
+        """
+        Move the map to the result; returns a FullBundleCommit.
+        """
+    def solve(self, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> BundleSummary:
+        """
+        Adjust; returns a BundleSummary.
+        """
+    def take_references(self, keyframe: int, image: numpy.ndarray) -> None:
+        """
+        Keep the patches of reference sightings in a keyframe. `image`: uint8 (h, w), as the
+        camera took it. Raises StateError for an unknown keyframe, ImageError for an image of
+        another size.
+        """
+    def weigh(self) -> None:
+        """
+        Put positions and weights of aligned sightings into the bundle.
+        """
+    @property
+    def counts(self) -> typing.Annotated[list[int], "FixedSize(5)"]:
+        """
+        Sightings tried in this round by AlignmentFailure; 0: aligned.
+        """
+    @property
+    def keyframes(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (k,) ids of the keyframes whose images are wanted.
+        """
+    @property
+    def median_error(self) -> float:
+        """
+        Median distance between sightings and points, pixels.
+        """
+    @property
+    def n_observations(self) -> int:
+        """
+        Observations.
+        """
+    @property
+    def n_points(self) -> int:
+        """
+        Points.
+        """
+    @property
+    def noise(self) -> AlignmentNoise:
+        """
+        Of aligned sightings.
+        """
+    @property
+    def right_counts(self) -> typing.Annotated[list[int], "FixedSize(5)"]:
+        """
+        The same of columns in right images.
+        """
+    @property
+    def right_noise(self) -> AlignmentNoise:
+        """
+        Of columns in right images.
+        """
 class LoopConsistency:
     """
     Believes a loop only when consecutive keyframes propose the same part of the map.
@@ -2924,6 +3134,12 @@ def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typi
     first. They are appended to `points` (gather_points of the last frame) and associated
     with `last`; temporary points left there are dropped first. Their ids start at
     FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
+    """
+def align_patch(reference: numpy.ndarray, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], A: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], image: numpy.ndarray, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], options: AlignmentOptions = ...) -> PatchAlignment:
+    """
+    Move the 9 x 9 patch at `position` of an image over another one until the grey values
+    agree, but for gain and offset. Images: uint8 (h, w). `A`: (2, 2), maps pixels around
+    `position` to pixels around `start`. Returns a PatchAlignment.
     """
 def align_rotation(first: Frame, second: Frame) -> ImageRotation | None:
     """

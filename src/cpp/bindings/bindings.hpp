@@ -23,6 +23,7 @@ void bind_map_contents(pybind11::module_& module);
 void bind_geometry(pybind11::module_& module);
 void bind_matching(pybind11::module_& module);
 void bind_optimize(pybind11::module_& module);
+void bind_alignment(pybind11::module_& module);
 void bind_loops(pybind11::module_& module);
 void bind_loop_correction(pybind11::module_& module);
 void bind_synthetic(pybind11::module_& module);

@@ -19,6 +19,7 @@ PYBIND11_MODULE(_core, module) {
   bind_geometry(module);
   bind_matching(module);
   bind_optimize(module);
+  bind_alignment(module);
   bind_loops(module);
   bind_loop_correction(module);
   bind_synthetic(module);

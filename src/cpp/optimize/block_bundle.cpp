@@ -16,7 +16,7 @@ constexpr std::uint32_t kGap = 2 * kLanes;
 
 bool is_finite(const BundleProblem::Observation& o) {
   return std::isfinite(o.u) && std::isfinite(o.v) && (!o.has_depth || std::isfinite(o.right_u)) &&
-         std::isfinite(o.inverse_sigma2);
+         std::isfinite(o.inverse_sigma2) && std::isfinite(o.right_factor);
 }
 
 bool is_finite(const BundleProblem::Camera& camera) {
@@ -206,7 +206,8 @@ void BlockBundle::set_weights(const BundleProblem& problem, const std::vector<st
     const std::uint32_t slot = slot_[i];
     slots.weight_u[slot] = sights_ ? weight : weight * (k.fx * k.fx);
     slots.weight_v[slot] = sights_ ? weight : weight * (k.fy * k.fy);
-    slots.weight_right[slot] = o.has_depth ? slots.weight_u[slot] : 0.0;
+    const double right = static_cast<double>(o.right_factor);
+    slots.weight_right[slot] = o.has_depth ? right * slots.weight_u[slot] : 0.0;
   }
 }
 

@@ -47,7 +47,7 @@ std::vector<double> judge(const BundleProblem& problem) {
     double squared = error.squaredNorm();
     if (o.has_depth) {
       const double right = camera.model->right_error(p, error, o.u, o.right_u);
-      squared += right * right;
+      squared += static_cast<double>(o.right_factor) * (right * right);
     }
     const double whitened = static_cast<double>(o.inverse_sigma2) * squared;
     chi2.push_back(std::isfinite(whitened) ? whitened : std::numeric_limits<double>::infinity());

@@ -23,6 +23,7 @@ struct BundleProblem {
     float u = 0, v = 0;
     float right_u = 0;  ///< only if has_depth
     float inverse_sigma2 = 1;
+    float right_factor = 1;  ///< inverse variance of the right column over that of u and v
     bool has_depth = false;
   };
   std::vector<Camera> cameras;

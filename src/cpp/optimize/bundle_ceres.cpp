@@ -146,6 +146,7 @@ class CeresMinimiser final : public BundleMinimiser, public ceres::EvaluationCal
       const bool shown = sight.allFinite();
       if (shown) m.sight = sight;
       m.scale = shown && usable[i] != 0 ? deviation(o) : 0.0;
+      m.right_scale = std::sqrt(static_cast<double>(o.right_factor));
     }
   }
 

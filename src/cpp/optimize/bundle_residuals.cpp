@@ -28,7 +28,7 @@ CameraRow row_v(const BundleMeasurement& m) { return pixel_row(m, 1); }
 CameraRow row_right(const BundleMeasurement& m) {
   CameraRow row = row_u(m);
   row.c += m.factor * m.view->camera().bf() / (m.p_c[2] * m.p_c[2]);
-  return row;
+  return {m.right_scale * row.a, m.right_scale * row.b, m.right_scale * row.c};
 }
 
 /// Derivative of the residual (minus the prediction) with respect to the six camera parameters.
@@ -114,8 +114,8 @@ double BundleMeasurement::evaluate() {
         (sight(row, 0) * p_c[0] + sight(row, 1) * p_c[1] + sight(row, 2) * p_c[2]) * inverse_q;
     residual[row] = -factor * predicted[row];
   }
-  residual[2] =
-      has_depth ? factor * (-predicted[0] - (u - right_u) + view->camera().bf() / p_c[2]) : 0.0;
+  const double disparity_error = view->camera().bf() / p_c[2] - (u - right_u);
+  residual[2] = has_depth ? right_scale * (factor * (disparity_error - predicted[0])) : 0.0;
   if (huber == 0) return 0;
   const double square =
       residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];

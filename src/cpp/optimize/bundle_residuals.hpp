@@ -49,8 +49,9 @@ struct BundleMeasurement {
   const Eigen::Matrix3d* chart = nullptr;
   double u = 0, right_u = 0;        ///< read with depth alone
   Sight sight = Sight::Identity();  ///< of the keypoint
-  double scale = 1;  ///< one over the standard deviation; 0 takes the observation out
-  double huber = 0;  ///< width of the kernel; 0: none
+  double scale = 1;        ///< one over the standard deviation; 0 takes the observation out
+  double right_scale = 1;  ///< that of the right column over that of u and v
+  double huber = 0;        ///< width of the kernel; 0: none
   bool has_depth = false;
 
   double p_c[3] = {};  ///< the point in the camera frame

@@ -20,6 +20,11 @@ from orbslam2py.maps.edits.placement import (
     place_by_trajectory,
 )
 from orbslam2py.maps.edits.saved import crop_saved_map
+from orbslam2py.maps.edits.sighting_alignment import (
+    AlignmentRecord,
+    ImagePairSequence,
+    align_sightings,
+)
 from orbslam2py.maps.edits.transform import transform_map
 from orbslam2py.maps.exports.colmap import export_colmap
 from orbslam2py.maps.exports.colours import with_colours
@@ -45,9 +50,11 @@ from orbslam2py.maps.snapshot import (
 from orbslam2py.maps.verify import verify_map_file
 
 __all__ = [
+    "AlignmentRecord",
     "Cameras",
     "Covisibility",
     "ImageOfKeyframe",
+    "ImagePairSequence",
     "ImageSequence",
     "Keyframes",
     "KeyframesSet",
@@ -66,6 +73,7 @@ __all__ = [
     "Run",
     "SavedMap",
     "VocabularyIdentity",
+    "align_sightings",
     "crop_saved_map",
     "crop_to_box",
     "crop_to_times",

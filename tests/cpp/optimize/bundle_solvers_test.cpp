@@ -64,6 +64,7 @@ BundleProblem drawn_bundle(std::uint64_t seed) {
       const double base = problem.cameras[c].model->bf() / p_c.z();
       o.right_u = static_cast<float>(pixel.x() - base + uniform(random, -0.7, 0.7));
       o.inverse_sigma2 = i % 3 == 0 ? 0.4823F : 1.0F;
+      o.right_factor = i % 4 == 0 ? 2.5F : i % 4 == 1 ? 0.2F : 1.0F;
       problem.observations.push_back(o);
     }
     Eigen::Vector3d shift;

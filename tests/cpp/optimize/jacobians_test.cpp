@@ -123,6 +123,7 @@ TEST(Jacobians, BundleResiduals) {
       m.right_u = u - camera_model->bf() / z + uniform(random, -8, 8);
       m.has_depth = true;
       m.scale = uniform(random, 0.3, 1);
+      m.right_scale = uniform(random, 0.5, 2);
       const auto free = [&](const Blocks& at) {
         view.move(at[0].data());
         evaluated = at[1];

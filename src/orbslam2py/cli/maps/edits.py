@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orbslam2py.cli.calibrate import Force, Quiet
+from orbslam2py.cli.maps.images import open_images
 from orbslam2py.cli.maps.places import (
     keyframes_between,
     read_known_points,
@@ -23,9 +27,11 @@ from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.targets import check_target
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps import (
+    AlignmentRecord,
     MapContents,
     Placement,
     SavedMap,
+    align_sightings,
     load_map,
     place_by_length,
     place_by_points,
@@ -194,19 +200,51 @@ def optimize(
         float | None,
         typer.Option(help="Seconds after which it stops and keeps its result so far."),
     ] = None,
+    aligned: Annotated[
+        bool,
+        typer.Option(
+            "--align",
+            help="First align the sightings of each point to each other in the images, to a "
+            "fraction of a pixel; needs --images.",
+        ),
+    ] = False,
+    images: Annotated[
+        str | None,
+        typer.Option(help="The sequence that the map was made of.", metavar="SEQUENCE"),
+    ] = None,
+    fps: Annotated[float | None, typer.Option(help="For --images: the same as in the run.")] = None,
+    times: Annotated[
+        Path | None, typer.Option(help="For --images: the same as in the run.")
+    ] = None,
+    split: Annotated[
+        bool, typer.Option("--split", help="For --images: the same as in the run.")
+    ] = False,
     number: MapNumber = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Refine all keyframes and points of a map together (full bundle adjustment).
 
-    Other maps of the file stay as they are.
+    Other maps of the file stay as they are. The keypoints of the map stay, also with --align.
     """
     if time_limit is not None and not (math.isfinite(time_limit) and time_limit > 0):
         raise MapFileError(f"--time-limit must be more than 0 seconds, got {time_limit:g}")
+    _check_image_options(aligned, images, [fps, times, split or None], time_limit)
     check_target(output, force=force)
+    if images is not None:
+        log_to(Console(stderr=True), quiet=quiet)
     saved = load_map(file, images=True)
-    refined, record = optimize_map(take_map(saved, number).contents, time_limit=time_limit)
+    contents = take_map(saved, number).contents
+    if images is not None:
+        sequence = open_images(saved, images, fps, times, split)
+        with _progress(quiet) as show:
+            refined, alignment = align_sightings(contents, sequence, progress=show)
+        save_edited(put_back(saved, number or 0, refined), output, force=force)
+        for line in _alignment_lines(alignment):
+            _say(quiet, line)
+        _say(quiet, _where(saved, number, output))
+        return
+    refined, record = optimize_map(contents, time_limit=time_limit)
     save_edited(put_back(saved, number or 0, refined), output, force=force)
     seconds = sum(record.milliseconds.values()) / 1000
     _say(
@@ -217,7 +255,57 @@ def optimize(
     _say(quiet, _where(saved, number, output))
 
 
+def _check_image_options(
+    aligned: bool, images: str | None, others: list[object], time_limit: float | None
+) -> None:
+    if aligned and images is None:
+        raise MapFileError(
+            "--align needs the images that the map was made of; give the sequence with --images"
+        )
+    if not aligned and (images is not None or any(option is not None for option in others)):
+        raise MapFileError(
+            "--images, --fps, --times and --split serve --align alone; add --align or leave them "
+            "out"
+        )
+    if aligned and time_limit is not None:
+        raise MapFileError("--align has no time limit; leave --time-limit out")
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[int, int], None]]:
+    """Show how many images have been read, if there is a terminal to show it on."""
+    console = Console(quiet=quiet)
+    columns = (TextColumn("images"), BarColumn(), MofNCompleteColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("images", total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
 # ---- printed text --------------------------------------------------------------------------------
+def _alignment_lines(record: AlignmentRecord) -> list[str]:
+    lines = [
+        f"{record.n_keyframes} keyframes, {record.n_points} points, {record.n_observations} "
+        f"sightings: {_share(record.n_aligned, record.failures)}"
+    ]
+    if record.n_right_aligned or any(record.right_failures.values()):
+        lines.append(f"Right images: {_share(record.n_right_aligned, record.right_failures)}")
+    lines.append(
+        f"Reprojection error, median: {record.error_before:.3f} to {record.error_after:.3f} pixels "
+        f"(noise of an aligned coordinate {record.noise:.3f}) in {record.seconds:.1f} s"
+    )
+    if not record.used:
+        lines.append("The adjustment found nothing better: the map is as it was")
+    return lines
+
+
+def _share(n_aligned: int, failures: dict[str, int]) -> str:
+    reasons = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in failures.items() if n)
+    n = n_aligned + sum(failures.values())
+    return f"{n_aligned} of {n} aligned" + (f" ({reasons})" if reasons else "")
+
+
 def _where(saved: SavedMap, number: int | None, output: Path) -> str:
     others = _others(saved)
     return f"{f'Map {number}' if others else 'The map'} is in {output}{others}"

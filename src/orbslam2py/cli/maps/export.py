@@ -18,9 +18,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from orbslam2py._arrays import ByteArray
 from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.maps.edits import MapNumber
+from orbslam2py.cli.maps.images import open_images
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.targets import check_apart, check_target
-from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps import (
     ImageOfKeyframe,
@@ -36,7 +36,6 @@ from orbslam2py.maps import (
     with_colours,
 )
 from orbslam2py.maps.edits.parts import take_map
-from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.trajectory import Trajectory
 
 
@@ -156,12 +155,7 @@ def _image_source(
     saved: SavedMap, images: str | None, fps: float | None, times: Path | None, split: bool
 ) -> ImageOfKeyframe | None:
     if images is not None:
-        sequence = open_input(
-            images, saved.sensor, settings=saved.settings, fps=fps, times=times, split=split
-        )
-        if not is_sequence(sequence):
-            raise DatasetError(f"--images {images} is a camera; give what it recorded")
-        return images_of(saved.contents, sequence)
+        return images_of(saved.contents, open_images(saved, images, fps, times, split))
     return (lambda keyframe: _decoded(saved, keyframe)) if saved.images else None
 
 

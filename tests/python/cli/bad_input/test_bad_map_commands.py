@@ -36,6 +36,7 @@ def _files(tmp_path: Path) -> None:
 
 
 CROP, ALIGN = "map crop a.orbmap -o out", "map align a.orbmap -o out"
+OPTIMIZE = "map optimize a.orbmap -o out"
 LENGTH = f"{ALIGN} --length 1 --between"
 EXPORT = "map export colmap a.orbmap out"
 
@@ -103,6 +104,13 @@ EXPORT = "map export colmap a.orbmap out"
         (f"{ALIGN} --truth folder", "folder", "TUM"),
         ("map optimize a.orbmap -o out --time-limit 0", "--time-limit", "more than 0"),
         ("map optimize text.orbmap -o out", "text.orbmap is not a map file", "save_map"),
+        (f"{OPTIMIZE} --align", "--align needs the images", "give the sequence with --images"),
+        (f"{OPTIMIZE} --images folder", "serve --align alone", "add --align"),
+        (f"{OPTIMIZE} --fps 3", "serve --align alone", "leave them out"),
+        (f"{OPTIMIZE} --align --images folder --time-limit 1", "no time limit", "--time-limit"),
+        (f"{OPTIMIZE} --align --images missing", "missing", "does not exist"),
+        (f"{OPTIMIZE} --align --images folder", "folder is no sequence", "give the folder"),
+        (f"{OPTIMIZE} --align --images 99", "99", "camera"),
         ("map export colmap text.orbmap out", "text.orbmap is not a map file", "save_map"),
         ("map export ply a.orbmap nowhere/a.ply", "nowhere", "no such folder"),
         ("map export colmap a.orbmap .", "holds other files", "give another folder"),

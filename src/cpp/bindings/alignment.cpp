@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include "alignment/align_patch.hpp"
+#include "base/errors.hpp"
+#include "bindings/arrays.hpp"
+#include "bindings/bindings.hpp"
+#include "bindings/stop_flag.hpp"
+#include "optimize/sighting_alignment.hpp"
+
+namespace orbslam::bindings {
+namespace {
+
+using namespace py::literals;
+
+void bind_failures(py::module_& module) {
+  py::enum_<AlignmentFailure>(module, "AlignmentFailure", "Why a patch was not aligned.")
+      .value("NONE", AlignmentFailure::kNone, "It was.")
+      .value("OUTSIDE", AlignmentFailure::kOutside,
+             "Patch or image do not reach that far, or a number is not finite.")
+      .value("FLAT", AlignmentFailure::kFlat, "No texture, or texture in one direction only.")
+      .value("NOT_CONVERGED", AlignmentFailure::kNotConverged,
+             "It moved too far, or did not come to rest.")
+      .value("LOW_CORRELATION", AlignmentFailure::kLowCorrelation,
+             "It came to rest where the image is another one.");
+  py::class_<AlignmentOptions>(module, "AlignmentOptions", "How align_patch works.")
+      .def(py::init([](int iterations, double max_shift, double min_correlation, double converged) {
+             return AlignmentOptions{iterations, max_shift, min_correlation, converged};
+           }),
+           "iterations"_a = AlignmentOptions().iterations,
+           "max_shift"_a = AlignmentOptions().max_shift,
+           "min_correlation"_a = AlignmentOptions().min_correlation,
+           "converged"_a = AlignmentOptions().converged)
+      .def_readonly("iterations", &AlignmentOptions::iterations, "Steps at most.")
+      .def_readonly("max_shift", &AlignmentOptions::max_shift,
+                    "From the start, pixels of the level; at most 4.")
+      .def_readonly("min_correlation", &AlignmentOptions::min_correlation,
+                    "Of the grey values, 0 to 1.")
+      .def_readonly("converged", &AlignmentOptions::converged,
+                    "A step shorter than that is the last one, pixels.");
+}
+
+void bind_patch(py::module_& module) {
+  py::class_<PatchAlignment>(module, "PatchAlignment", "What align_patch found.")
+      .def_property_readonly("ok", &PatchAlignment::ok, "It was aligned.")
+      .def_readonly("failure", &PatchAlignment::failure, "Why not.")
+      .def_readonly("iterations", &PatchAlignment::iterations, "Steps.")
+      .def_readonly("position", &PatchAlignment::position, "(2,) pixels of the image.")
+      .def_readonly("information", &PatchAlignment::information,
+                    "(2, 2) inverse covariance of the position, pixels^-2.")
+      .def_readonly("correlation", &PatchAlignment::correlation, "Of the grey values, -1 to 1.")
+      .def_readonly("gain", &PatchAlignment::gain,
+                    "Contrast of the image over that of the reference.");
+  module.def(
+      "align_patch",
+      [](const py::array& reference, const Eigen::Vector2d& position, const Eigen::Matrix2d& A,
+         const py::array& image, const Eigen::Vector2d& start, const AlignmentOptions& options) {
+        const cv::Mat from = view_uint8(reference, "the reference"),
+                      to = view_uint8(image, "the image");
+        const py::gil_scoped_release release;
+        ReferencePatch patch;
+        if (!cut_patch(from, position, patch)) return PatchAlignment();
+        return align_patch(patch, A, to, start, options);
+      },
+      "reference"_a, "position"_a, "A"_a, "image"_a, "start"_a,
+      py::arg_v("options", AlignmentOptions(), "AlignmentOptions()"),
+      "Move the 9 x 9 patch at `position` of an image over another one until the grey values\n"
+      "agree, but for gain and offset. Images: uint8 (h, w). `A`: (2, 2), maps pixels around\n"
+      "`position` to pixels around `start`. Returns a PatchAlignment.");
+}
+
+cv::Mat image_or_none(const py::object& image, const char* what) {
+  return image.is_none() ? cv::Mat() : view_uint8(py::array(image), what);
+}
+
+void bind_steps(py::class_<SightingAlignment>& type) {
+  type.def(
+          "take_references",
+          [](SightingAlignment& alignment, KeyFrameId keyframe, const py::array& image) {
+            const cv::Mat grey = view_uint8(image, "the image");
+            const py::gil_scoped_release release;
+            alignment.take_references(keyframe, grey);
+          },
+          "keyframe"_a, "image"_a,
+          "Keep the patches of reference sightings in a keyframe. `image`: uint8 (h, w), as the\n"
+          "camera took it. Raises StateError for an unknown keyframe, ImageError for an image of\n"
+          "another size.")
+      .def("begin_round", &SightingAlignment::begin_round, Release(),
+           "Forget the last round; compute patches by the present poses.")
+      .def(
+          "align",
+          [](SightingAlignment& alignment, KeyFrameId keyframe, const py::array& image,
+             const py::object& right) {
+            const cv::Mat grey = view_uint8(image, "the image");
+            const cv::Mat other = image_or_none(right, "the right image");
+            const py::gil_scoped_release release;
+            alignment.align(keyframe, grey, other);
+          },
+          "keyframe"_a, "image"_a, "right"_a = py::none(),
+          "Align the sightings in a keyframe, and in the right image of a rectified pair.")
+      .def("weigh", &SightingAlignment::weigh, Release(),
+           "Put positions and weights of aligned sightings into the bundle.")
+      .def(
+          "solve",
+          [](SightingAlignment& alignment, const FullBundleOptions& options,
+             const std::shared_ptr<StopFlag>& abort,
+             int n_threads) { return alignment.solve(options, flag_of(abort), n_threads); },
+          py::arg_v("options", FullBundleOptions(), "FullBundleOptions()"), "abort"_a = py::none(),
+          "n_threads"_a = 1, Release(), "Adjust; returns a BundleSummary.")
+      .def("commit", &SightingAlignment::commit, "map"_a, Release(),
+           "Move the map to the result; returns a FullBundleCommit.");
+}
+
+void bind_sightings(py::module_& module) {
+  py::class_<AlignmentNoise>(module, "AlignmentNoise", "Noise of aligned sightings.")
+      .def_readonly("factor", &AlignmentNoise::factor,
+                    "Standard deviation over that which the patches give.")
+      .def_readonly("deviation", &AlignmentNoise::deviation,
+                    "Median standard deviation, so scaled, pixels of the level.");
+  py::class_<SightingAlignment> type(
+      module, "SightingAlignment",
+      "Full bundle adjustment with sightings that are aligned to each other.\n\n"
+      "Order: take_references() for all images; then rounds of begin_round(), align() for all\n"
+      "images, weigh() and solve(); at last commit(). The map must not change meanwhile.");
+  type.def(py::init<const Map&, MapIndex, AlignmentOptions>(), "map"_a, "which"_a = kNoMap,
+           py::arg_v("options", AlignmentOptions(), "AlignmentOptions()"), Release());
+  bind_steps(type);
+  type.def_property_readonly(
+          "keyframes", [](const SightingAlignment& a) { return to_array(a.keyframes()); },
+          "(k,) ids of the keyframes whose images are wanted.")
+      .def_property_readonly(
+          "n_points", [](const SightingAlignment& a) { return a.bundle().points.size(); },
+          "Points.")
+      .def_property_readonly(
+          "n_observations",
+          [](const SightingAlignment& a) { return a.bundle().problem.observations.size(); },
+          "Observations.")
+      .def_property_readonly("counts", &SightingAlignment::counts,
+                             "Sightings tried in this round by AlignmentFailure; 0: aligned.")
+      .def_property_readonly("right_counts", &SightingAlignment::right_counts,
+                             "The same of columns in right images.")
+      .def_property_readonly("noise", &SightingAlignment::noise, "Of aligned sightings.")
+      .def_property_readonly("right_noise", &SightingAlignment::right_noise,
+                             "Of columns in right images.")
+      .def_property_readonly("median_error", &SightingAlignment::median_error,
+                             "Median distance between sightings and points, pixels.");
+}
+
+}  // namespace
+
+void bind_alignment(py::module_& module) {
+  bind_failures(module);
+  bind_patch(module);
+  bind_sightings(module);
+}
+
+}  // namespace orbslam::bindings
