@@ -49,19 +49,18 @@ Vector6d to_vector(const ImuBias& bias) {
 std::unique_ptr<Preintegration> preintegrate(const Input<double>& array, double gyro_noise,
                                              double accel_noise, double gyro_walk,
                                              double accel_walk, const std::optional<Vector6d>& bias,
-                                             std::optional<double> begin,
-                                             std::optional<double> end, double max_gap,
-                                             double gyro_range, double accel_range) {
+                                             std::optional<double> begin, std::optional<double> end,
+                                             double max_gap, double gyro_range,
+                                             double accel_range) {
   std::vector<ImuSample> samples = imu_samples_of(array);
   const py::gil_scoped_release release;
   if ((begin || end) && !samples.empty()) {
-    samples = samples_between(samples, begin.value_or(samples.front().t),
-                              end.value_or(samples.back().t));
+    samples =
+        samples_between(samples, begin.value_or(samples.front().t), end.value_or(samples.back().t));
   }
   return std::make_unique<Preintegration>(
       std::move(samples), ImuNoise{gyro_noise, accel_noise, gyro_walk, accel_walk},
-      bias ? bias_of(*bias) : ImuBias{},
-      PreintegrationOptions{max_gap, gyro_range, accel_range});
+      bias ? bias_of(*bias) : ImuBias{}, PreintegrationOptions{max_gap, gyro_range, accel_range});
 }
 
 constexpr const char* kPreintegrationDoc =
@@ -77,20 +76,20 @@ constexpr const char* kInitDoc =
 
 samples: float64 (n, 7), rows `[t, gyro rad/s, accelerometer m/s^2]` with growing t [s]; the
 accelerometer at rest points up. gyro_noise [rad/s/sqrt(Hz)], accel_noise [m/s^2/sqrt(Hz)],
-gyro_walk [rad/s^2/sqrt(Hz)] and accel_walk [m/s^3/sqrt(Hz)] are the densities of the noise. bias:
-(6,), gyro and accelerometer; by default 0. begin, end: seconds; readings there are interpolated, or
-no sample lies beyond. max_gap: longer intervals [s] count as gaps. gyro_range, accel_range:
-readings at the range [rad/s, m/s^2] count as saturated. Raises ValueError if there are fewer than
-two samples, if one is not finite, or if the times do not grow.)";
+gyro_walk [rad/s^2/sqrt(Hz)] and accel_walk [m/s^3/sqrt(Hz)] are the densities of the noise.
+bias: (6,), gyro and accelerometer; by default 0. begin, end: seconds; readings there are
+interpolated, or held where no sample lies beyond. max_gap: longer intervals [s] count as gaps.
+gyro_range, accel_range: readings at the range [rad/s, m/s^2] count as saturated. Raises ValueError
+if there are fewer than two samples, if one is not finite, or if the times do not grow.)";
 
 void bind_preintegration(py::module_& module) {
   using P = Preintegration;
   const double inf = std::numeric_limits<double>::infinity();
   py::class_<P>(module, "Preintegration", kPreintegrationDoc)
       .def(py::init(&preintegrate), "samples"_a, py::kw_only(), "gyro_noise"_a, "accel_noise"_a,
-           "gyro_walk"_a = 0.0, "accel_walk"_a = 0.0, "bias"_a = py::none(),
-           "begin"_a = py::none(), "end"_a = py::none(), "max_gap"_a = 0.05, "gyro_range"_a = inf,
-           "accel_range"_a = inf, kInitDoc)
+           "gyro_walk"_a = 0.0, "accel_walk"_a = 0.0, "bias"_a = py::none(), "begin"_a = py::none(),
+           "end"_a = py::none(), "max_gap"_a = 0.05, "gyro_range"_a = inf, "accel_range"_a = inf,
+           kInitDoc)
       .def_property_readonly("begin", &P::begin, "First moment [s].")
       .def_property_readonly("end", &P::end, "Last moment [s].")
       .def_property_readonly("dt", &P::duration, "Duration [s].")

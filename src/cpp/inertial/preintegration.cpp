@@ -204,8 +204,8 @@ ImuState Preintegration::predict(const ImuState& state, const ImuBias& bias,
   const ImuMotion motion = corrected(bias);
   const Eigen::Quaterniond& R = state.T_wb.rotation();
   const double dt = duration_;
-  const Eigen::Vector3d position = state.T_wb.translation() + dt * state.velocity +
-                                   0.5 * dt * dt * gravity + R * motion.dp;
+  const Eigen::Vector3d position =
+      state.T_wb.translation() + dt * state.velocity + 0.5 * dt * dt * gravity + R * motion.dp;
   return {Pose(R * motion.dR, position), state.velocity + dt * gravity + R * motion.dv};
 }
 

@@ -22,6 +22,8 @@ from orbslam2py.datasets.euroc_calibration import (
     read_sensor_yaml,
     stereo_settings,
 )
+from orbslam2py.datasets.imu import ImuSamples
+from orbslam2py.datasets.imu_csv import read_imu_csv
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
@@ -162,6 +164,11 @@ class EurocSequence(RecordedSequence):
             # R of the rectification turns raw into rectified coordinates.
             T_body_camera[:3, :3] = T_body_camera[:3, :3] @ rectification.left.R.T
         return Trajectory(body.timestamps, body.T_wc @ T_body_camera)
+
+    def imu(self) -> ImuSamples | None:
+        """Read ``imu0/data.csv``; see `RecordedSequence.imu`."""
+        path = self._root / "imu0" / "data.csv"
+        return read_imu_csv(path) if path.is_file() else None
 
     @cached_property
     def _rectifiers(self) -> tuple[Rectifier, Rectifier]:

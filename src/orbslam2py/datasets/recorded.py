@@ -28,6 +28,7 @@ from orbslam2py.datasets.grey_scale import (
     spread_over,
 )
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.imu import ImuSamples
 from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
@@ -161,6 +162,21 @@ class RecordedSequence(FramesInOrder, ABC):
     @abstractmethod
     def ground_truth(self) -> Trajectory | None:
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
+
+    def imu(self) -> ImuSamples | None:
+        """Read the samples of the IMU, each time anew; nothing is read before.
+
+        Returns
+        -------
+        ImuSamples or None
+            On the clock of `timestamps`, in rad/s and m/s^2; None if the recording has none.
+
+        Raises
+        ------
+        DatasetError
+            Naming the file and the line that is wrong.
+        """
+        return None
 
     @cached_property
     def _rectifiers(self) -> Rectifiers | None:

@@ -13,17 +13,23 @@ from orbslam2py.settings.groups import (
     StereoRectification,
     ViewerSettings,
 )
+from orbslam2py.settings.imu import ImuSettings
+from orbslam2py.settings.imu_files import read_imu_settings
+from orbslam2py.settings.imu_noise import IMU_NOISE, ImuNoise, imu_noise
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, builtin_settings, resolve_settings
 
 __all__ = [
     "BUILTIN_NAMES",
+    "IMU_NOISE",
     "AngleOfView",
     "CameraModel",
     "CameraRectification",
     "CameraSettings",
     "DepthSettings",
     "FitThresholds",
+    "ImuNoise",
+    "ImuSettings",
     "Misfit",
     "OrbSettings",
     "Sensor",
@@ -31,6 +37,8 @@ __all__ = [
     "StereoRectification",
     "ViewerSettings",
     "builtin_settings",
+    "imu_noise",
+    "read_imu_settings",
     "resolve_settings",
     "settings_for_camera",
 ]

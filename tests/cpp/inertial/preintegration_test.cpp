@@ -72,8 +72,7 @@ TEST(Preintegration, FollowsAnAnalyticMotion) {
                        AnalyticMotion::velocity(begin)};
   double before = 0;
   for (const int n : {100, 200, 400}) {
-    const ImuState last =
-        of(AnalyticMotion::samples(begin, end, n)).predict(first, {}, kFall);
+    const ImuState last = of(AnalyticMotion::samples(begin, end, n)).predict(first, {}, kFall);
     const double turn =
         so3_log(last.T_wb.rotation().conjugate() * AnalyticMotion::rotation(end)).norm();
     const double moved = (last.T_wb.translation() - AnalyticMotion::position(end)).norm();
