@@ -27,7 +27,13 @@ from orbslam2py.datasets.imu_csv import read_imu_csv
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import Sensor, Settings, StereoRectification
+from orbslam2py.settings import (
+    ImuSettings,
+    Sensor,
+    Settings,
+    StereoRectification,
+    read_imu_settings,
+)
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_euroc
 
 _log = logging.getLogger(__name__)
@@ -169,6 +175,11 @@ class EurocSequence(RecordedSequence):
         """Read ``imu0/data.csv``; see `RecordedSequence.imu`."""
         path = self._root / "imu0" / "data.csv"
         return read_imu_csv(path) if path.is_file() else None
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read ``sensor.yaml`` of IMU and left camera; see `RecordedSequence.imu_settings`."""
+        paths = [self._root / name / "sensor.yaml" for name in ("imu0", "cam0")]
+        return read_imu_settings(*paths) if all(path.is_file() for path in paths) else None
 
     @cached_property
     def _rectifiers(self) -> tuple[Rectifier, Rectifier]:

@@ -31,7 +31,7 @@ from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.imu import ImuSamples
 from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import Sensor, Settings, resolve_settings
+from orbslam2py.settings import ImuSettings, Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
 #: A sequence is refused if this number of frames at its beginning have no images.
@@ -175,6 +175,18 @@ class RecordedSequence(FramesInOrder, ABC):
         ------
         DatasetError
             Naming the file and the line that is wrong.
+        """
+        return None
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read what comes with the recording about its IMU; None if nothing does.
+
+        ``T_ci`` is for the unrectified camera.
+
+        Raises
+        ------
+        SettingsError
+            Naming the file and the key that is wrong.
         """
         return None
 
