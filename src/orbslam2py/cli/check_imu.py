@@ -28,7 +28,6 @@ from orbslam2py.cli.run_options import (
 from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.datasets import (
     AccelUnit,
-    Frame,
     FramesInOrder,
     GyroUnit,
     IterableSequence,
@@ -165,17 +164,13 @@ def _believed(
 
 def _tracked(images: IterableSequence, vocabulary: Path | None, seconds: float) -> list[Trajectory]:
     """Paths of the camera in the first part of the recording, one per map."""
-    first: list[float] = []
-
-    def is_early(frame: Frame) -> bool:
-        first.append(frame.timestamp)
-        return frame.timestamp - first[0] <= seconds
+    last = float(images.timestamps[0]) + seconds
 
     system = System(
         images.settings, images.sensor, vocabulary, deterministic=True, loop_closing=False
     )
     with system:
-        system.run(itertools.takewhile(is_early, iter(images)))
+        system.run(itertools.takewhile(lambda frame: frame.timestamp <= last, images))
     return [path for path in system.trajectories() if len(path)]
 
 

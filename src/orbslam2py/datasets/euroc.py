@@ -174,12 +174,14 @@ class EurocSequence(RecordedSequence):
     def imu(self) -> ImuSamples | None:
         """Read ``imu0/data.csv``; see `RecordedSequence.imu`."""
         path = self._root / "imu0" / "data.csv"
-        return read_imu_csv(path) if path.is_file() else None
+        return read_imu_csv(path) if path.is_file() else super().imu()
 
     def imu_settings(self) -> ImuSettings | None:
         """Read ``sensor.yaml`` of IMU and left camera; see `RecordedSequence.imu_settings`."""
         paths = [self._root / name / "sensor.yaml" for name in ("imu0", "cam0")]
-        return read_imu_settings(*paths) if all(path.is_file() for path in paths) else None
+        if all(path.is_file() for path in paths):
+            return read_imu_settings(*paths)
+        return super().imu_settings()
 
     @cached_property
     def _rectifiers(self) -> tuple[Rectifier, Rectifier]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from orbslam2py._arguments import is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import Sensor
+from orbslam2py.settings import Sensor, imu_noise
 from orbslam2py.synthetic.motions import SyntheticMotion
 from orbslam2py.synthetic.scenes import (
     CORNERED,
@@ -83,6 +83,12 @@ class SyntheticOptions:
         walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the blocks).
     yaw
         Degrees to the right of the direction of travel.
+    imu
+        Whether there is an IMU beside the camera. Its path is a smooth curve through the poses of
+        the images, which stay as they are; not with `pieces`, between which the camera jumps.
+    imu_noise
+        Name of a chip whose noise the samples have, such as ``bmi088``, with a bias that walks; by
+        default they are exact.
 
     Raises
     ------
@@ -113,6 +119,8 @@ class SyntheticOptions:
     gap: float | None = None
     overlap: float | None = None
     length: float | None = None
+    imu: bool = False
+    imu_noise: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -137,6 +145,7 @@ class SyntheticOptions:
         _check_range("lateral", self.lateral, -beside, beside)
         _check_range("yaw", self.yaw, -180, 180)
         self._check_pace()
+        self._check_imu()
         if self.laps is not None and self.world not in LAPS:
             names = ", ".join(map(str, LAPS))
             raise SettingsError(
@@ -177,6 +186,18 @@ class SyntheticOptions:
             raise SettingsError(
                 "overlap is what pieces share, and there is only one; give more pieces, or leave "
                 "it out"
+            )
+
+    def _check_imu(self) -> None:
+        if not isinstance(self.imu, bool):
+            raise SettingsError(f"imu is {shown(self.imu)}; give True or False")
+        if self.imu_noise is not None:
+            if not self.imu:
+                raise SettingsError("imu_noise is that of an IMU; give imu (--imu) as well")
+            imu_noise(self.imu_noise)
+        if self.imu and self.pieces is not None:
+            raise SettingsError(
+                "the camera jumps between pieces, which no IMU can measure; leave out imu or pieces"
             )
 
     def _check_pace(self) -> None:

@@ -329,7 +329,7 @@ def _other_axes(
 ) -> FloatArray | None:
     R = settings.T_ci[:3, :3]
     P = min(signed_permutations(), key=lambda P: rates.misfit(R @ P))
-    turned = settings.T_ci.copy()
+    turned: FloatArray = settings.T_ci.copy()
     turned[:3, :3] = rates.R
     if np.linalg.norm(R @ P - rates.M) < _SAME_AXES:
         text = (

@@ -146,7 +146,7 @@ def _design(at: FloatArray, p: FloatArray, biased: FloatArray) -> tuple[FloatArr
 
 def _solve(A: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solutions, one a column, and the sum of squares that each leaves."""
-    x = np.linalg.lstsq(A, y, rcond=None)[0]
+    x = np.asarray(np.linalg.lstsq(A, y, rcond=None)[0], np.float64)
     return x, np.asarray(((A @ x - y) ** 2).sum(axis=0))
 
 
