@@ -35,6 +35,8 @@ _EXPLAINED = 0.8
 _SMALL_OFFSET, _SMALL_ANGLE = 5e-3, 3 * _DEGREE
 #: Relative error of a scale, or of gravity, that may be one of the path.
 _SMALL_SCALE = 0.1
+#: Usual length of the specific force [m/s^2], beyond which its unit is wrong.
+_ODD_FORCE = (4.0, 30.0)
 #: Difference of an accelerometer's misfits [m] that may be one of the path.
 _SMALL_MISFIT = 5e-3
 #: Norm of the difference of two rotations that are 16 degrees apart.
@@ -201,7 +203,8 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
             "multiply by 9.81, or give --accel-unit g",
         )
         return gyro, accel * streams.GRAVITY
-    if not unit:
+    low, high = _ODD_FORCE
+    if not low < length < high:
         report.blame(
             "scale",
             f"the accelerometer usually reads {length:.4g}, but gravity is 9.81 m/s^2; correct its "

@@ -92,8 +92,10 @@ def fit_gravity(
     if inside.sum() < 10 or np.ptp(at[inside]) < _SHORTEST:
         return None
     at, T_wc = at[inside], path.T_wc[inside]
-    use = (t >= at[0]) & (t <= at[-1])
-    t, accel = t[use], accel[use]
+    # With a sample beyond each end: things fall far in a part of a step.
+    first = max(0, int(np.searchsorted(t, at[0], side="right")) - 1)
+    last = int(np.searchsorted(t, at[-1], side="left")) + 1
+    t, accel = t[first:last], accel[first:last]
     R_wb = _rotations_at(at, T_wc[:, :3, :3], t) @ T_ci[:3, :3]
     arm = T_wc[:, :3, :3] @ T_ci[:3, 3]  # from the camera to the IMU, metres
     # Twice integrated: each axis of the IMU by each reading, and each axis alone for the bias.

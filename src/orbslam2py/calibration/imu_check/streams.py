@@ -15,16 +15,18 @@ _NEAR_GRAVITY = (7.0, 13.0)
 _DEAD = 20
 #: Samples in a row at the largest value, from which on it may be the end of the range.
 _FLAT = 4
-#: Change [share of the range] before such a row, which a smooth peak does not have.
-_STEEP = 0.01
+#: Change [share of what the axis covers] before such a row, which a smooth peak does not have.
+_STEEP = 3e-3
 
 
 def swapped(gyro: FloatArray, accel: FloatArray) -> bool:
     """Whether the readings (n, 3) of the gyro are those of the accelerometer and the reverse."""
     low, high = _NEAR_GRAVITY
-    g, a = (float(np.median(np.linalg.norm(one, axis=1))) for one in (gyro, accel))
-    # A gyro that reads degrees may turn with 10 degrees/s, but beside it gravity is there.
-    return low < g < high and not low < a < high and not 0.7 < a < 1.3 and a < 5
+    lengths = [np.linalg.norm(one, axis=1) for one in (gyro, accel)]
+    g, a = (float(np.median(one)) for one in lengths)
+    steady = float(lengths[1].std()) / max(a, 1e-9) < float(lengths[0].std()) / max(g, 1e-9)
+    # Beside a gyro that turns with 10 degrees/s, gravity of 1 g is there, steadier than the gyro.
+    return low < g < high and a < 5 and not (0.7 < a < 1.3 and steady)
 
 
 def dead_axes(readings: FloatArray) -> list[str]:
@@ -54,7 +56,7 @@ def saturated(axis: FloatArray) -> FloatArray:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], at_top, [False]]).astype(int)))
         for begin, end in edges.reshape(-1, 2):
             around = [values[k] for k in (begin - 1, end) if 0 <= k < len(values)]
-            if end - begin >= least and around and top - min(around) > _STEEP * top:
+            if end - begin >= least and around and top - min(around) > _STEEP * float(np.ptp(axis)):
                 found |= at_top
     return np.asarray(found)
 
