@@ -16,8 +16,8 @@ from orbslam2py.trajectory import Trajectory
 
 #: Seconds between two poses, beyond which they give no rate.
 _LONGEST_STEP = 0.3
-#: Steps of the search for the time offset [s]; the best is refined.
-_STEP = 2e-3
+#: Steps of the coarse and of the fine search for the time offset [s]; the best is refined.
+_COARSE, _STEP = 1e-2, 2e-3
 
 
 @dataclass(frozen=True)
@@ -143,14 +143,22 @@ def fit_rates(
     RateFit or None
         None if too few intervals lie inside the samples.
     """
-    offsets = around + np.arange(-reach, reach + _STEP / 2, _STEP)
     kept = np.ones(len(camera), dtype=bool)
-    best = around
+
+    def shares_at(offsets: FloatArray) -> FloatArray:
+        return np.array([_share(camera, gyro, offset, kept, least) for offset in offsets])
+
+    coarse = around + np.arange(-reach, reach + _COARSE / 2, _COARSE)
+    shares = shares_at(coarse)
+    if not np.isfinite(shares).any():
+        return None
+    best = float(coarse[np.nanargmax(shares)])
     for _ in range(2):  # with outliers of the camera, then without
-        shares = np.array([_share(camera, gyro, offset, kept, least) for offset in offsets])
+        fine = best + np.arange(-_COARSE, _COARSE + _STEP / 2, _STEP)
+        shares = shares_at(fine)
         if not np.isfinite(shares).any():
             return None
-        best = _peak(offsets, shares)
+        best = _peak(fine, shares)
         means, inside = gyro.over(camera.begin + best, camera.end + best)
         use = kept & inside
         if use.sum() < least:
