@@ -12,6 +12,7 @@ import numpy as np
 
 from orbslam2py._arguments import cannot_open
 from orbslam2py._arrays import FloatArray
+from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.imu import ImuSamples, make_samples
 from orbslam2py.errors import DatasetError
 
@@ -117,6 +118,27 @@ def read_imu_csv(
     data[:, 1:4] *= GyroUnit(gyro_unit or columns.gyro or GyroUnit.RADIANS).factor
     data[:, 4:] *= AccelUnit(accel_unit or columns.accel or AccelUnit.METRES).factor
     return make_samples(str(path), data)
+
+
+def read_stream(path: Path) -> FloatArray:
+    """Read a list of times [s] and three readings of one sensor, float64 (n, 4).
+
+    Raises
+    ------
+    DatasetError
+        Naming the file and the line.
+    """
+    rows = []
+    for line in content_lines(path):
+        try:
+            rows.append([float(field) for field in line.fields[:4]])
+            if len(rows[-1]) < 4:
+                raise ValueError
+        except ValueError:
+            raise DatasetError(
+                f"{path}:{line.number}: this is no sample of an IMU; give a time and three numbers"
+            ) from None
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
 def _fields(line: str, *, header: bool = False) -> list[str]:

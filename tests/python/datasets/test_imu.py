@@ -9,6 +9,8 @@ import pytest
 from orbslam2py import DatasetError
 from orbslam2py.datasets import imu_of, open_sequence, read_imu_csv
 from orbslam2py.datasets.imu import joined_streams
+from orbslam2py.datasets.imu_csv import read_stream
+from orbslam2py.datasets.layouts.kitti_raw_poses import read_oxts_imu
 
 EUROC = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
@@ -122,6 +124,24 @@ def test_two_streams_meet_at_the_times_of_the_gyro():
 
 def test_objects_without_an_imu_have_no_samples():
     assert imu_of(object()) is None
+
+
+def test_packets_of_kitti_raw(tmp_path):
+    for k in range(3):
+        written(tmp_path / f"{k:010d}.txt", [" ".join(str(n + 100 * k) for n in range(30))])
+    numbers, readings = read_oxts_imu(tmp_path, 3)
+    assert numbers == [0, 1, 2]
+    assert readings[1].tolist() == [117, 118, 119, 111, 112, 113]
+    written(tmp_path / "0000000001.txt", ["1 2 3 4 5 6"])
+    with pytest.raises(DatasetError, match=r"0000000001\.txt .* and all readings"):
+        read_oxts_imu(tmp_path, 3)
+
+
+def test_a_list_of_one_stream(tmp_path):
+    path = written(tmp_path / "gyro.txt", ["#Time wx wy wz", "1.5 1 2 3", "1.505 4 5 6"])
+    assert read_stream(path).tolist() == [[1.5, 1, 2, 3], [1.505, 4, 5, 6]]
+    with pytest.raises(DatasetError, match=r"bad\.txt:1"):
+        read_stream(written(tmp_path / "bad.txt", ["1.5 1 2"]))
 
 
 @pytest.mark.shared
