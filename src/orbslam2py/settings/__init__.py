@@ -15,13 +15,12 @@ from orbslam2py.settings.groups import (
 )
 from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.settings.imu_files import read_imu_settings
-from orbslam2py.settings.imu_noise import IMU_NOISE, ImuNoise, imu_noise
+from orbslam2py.settings.imu_presets import ImuNoise, imu_noise
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, builtin_settings, resolve_settings
 
 __all__ = [
     "BUILTIN_NAMES",
-    "IMU_NOISE",
     "AngleOfView",
     "CameraModel",
     "CameraRectification",

@@ -29,7 +29,7 @@ class _Plausible:
     above: str
 
 
-#: By the data sheets in `imu_noise`; files of other programs have figures up to 10 times larger.
+#: By the data sheets in `imu_presets`; files of other programs have figures up to 10 times larger.
 _PLAUSIBLE = {
     "gyro_noise": _Plausible(
         "rad/s/sqrt(Hz)",

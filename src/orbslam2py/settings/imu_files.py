@@ -22,7 +22,7 @@ from orbslam2py._arguments import cannot_open
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.imu import ImuSettings, rigid_transform
-from orbslam2py.settings.imu_noise import ImuNoise
+from orbslam2py.settings.imu_presets import ImuNoise
 from orbslam2py.settings.opencv_yaml import Entry, flat, parse_number, read_matrix, scan
 
 _log = logging.getLogger(__name__)
