@@ -14,6 +14,7 @@ from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
 __all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_patch', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -519,6 +520,157 @@ class Camera:
     def pixels_per_radian(self) -> float:
         """
         Pixels that the image moves in its middle per radian of turning.
+        """
+class CameraModel:
+    """
+    A central camera of any model, with raw pixels. Immutable.
+    """
+    def __init__(self, name: str, parameters: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Raises SettingsError that names model, parameter and remedy.
+        """
+    def angle_of_view(self) -> tuple[float, float, float]:
+        """
+        (horizontal, vertical, diagonal) [rad].
+        """
+    def pixels_per_radian(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pixels per radian (n,) float64 at pixels (n, 2), the geometric mean over all
+        directions; NaN where the model shows nothing.
+        """
+    def project(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN outside of the domain.
+        """
+    def project_with_jacobian(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]:
+        """
+        Pixels (n, 2) and their derivatives (n, 2, 3) by the points (n, 3), float64; NaN
+        outside of the domain.
+        """
+    def unproject(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Unit rays (n, 3) float64 of pixels (n, 2); NaN where the model shows nothing.
+        """
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def parameter_names(self) -> list[str]:
+        ...
+    @property
+    def parameters(self) -> list[float]:
+        ...
+class Preintegration:
+    """
+    IMU samples of an interval, preintegrated on the manifold (Forster et al., T-RO 2017).
+
+    The relative motion between the first and the last moment, free of gravity and of the first
+    velocity: `R_j = R_i dR`, `v_j = v_i + g dt + R_i dv`, `p_j = p_i + v_i dt + g dt^2 / 2 + R_i dp`.
+    All vectors are in the frame of the IMU. Errors are ordered (rotation [rad], velocity [m/s],
+    position [m]); that of the rotation acts on the right of `dR`.
+    """
+    def __init__(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], *, gyro_noise: typing.SupportsFloat | typing.SupportsIndex, accel_noise: typing.SupportsFloat | typing.SupportsIndex, gyro_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, accel_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"] | None = None, begin: typing.SupportsFloat | typing.SupportsIndex | None = None, end: typing.SupportsFloat | typing.SupportsIndex | None = None, max_gap: typing.SupportsFloat | typing.SupportsIndex = 0.05, gyro_range: typing.SupportsFloat | typing.SupportsIndex = ..., accel_range: typing.SupportsFloat | typing.SupportsIndex = ...) -> None:
+        """
+        Integrate samples, from the first to the last or between two moments.
+
+        samples: float64 (n, 7), rows `[t, gyro rad/s, accelerometer m/s^2]` with growing t [s]; the
+        accelerometer at rest points up. gyro_noise [rad/s/sqrt(Hz)], accel_noise [m/s^2/sqrt(Hz)],
+        gyro_walk [rad/s^2/sqrt(Hz)] and accel_walk [m/s^3/sqrt(Hz)] are the densities of the noise. bias:
+        (6,), gyro and accelerometer; by default 0. begin, end: seconds; readings there are interpolated, or held where
+        no sample lies beyond. max_gap: longer intervals [s] count as gaps. gyro_range, accel_range:
+        readings at the range [rad/s, m/s^2] count as saturated. Raises ValueError if there are fewer than
+        two samples, if one is not finite, or if the times do not grow.
+        """
+    def corrected(self, bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"], typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]]:
+        """
+        dR (3, 3), dv (3,), dp (3,) at another bias (6,), to first order.
+        """
+    def joined(self, next: Preintegration) -> Preintegration:
+        """
+        Both intervals as one, with the bias, noise and limits of this one. Raises ValueError unless `next` begins where this one ends.
+        """
+    def predict(self, T_wb: Pose, velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], gravity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"] | None = None) -> tuple[Pose, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]]:
+        """
+        Pose `T_wb` and velocity (3,) [m/s] of the IMU in the world at the end of the interval, from those at its begin. gravity: acceleration of free fall in the world (3,) [m/s^2], (0, 0, -9.81) where z is up. bias: (6,), by default that of the integration.
+        """
+    def reintegrated(self, bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]) -> Preintegration:
+        """
+        The same samples, integrated again with another bias (6,).
+        """
+    @property
+    def begin(self) -> float:
+        """
+        First moment [s].
+        """
+    @property
+    def bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        Bias (6,) it was integrated with: gyro [rad/s], accelerometer [m/s^2].
+        """
+    @property
+    def bias_walk_covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        """
+        Of the change of the bias during the interval, (6, 6).
+        """
+    @property
+    def by_bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 6]"]:
+        """
+        Derivative of (rotation, velocity, position) by the bias (gyro, accelerometer), (9, 6).
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[9, 9]"]:
+        """
+        Of (rotation, velocity, position), (9, 9), by the noise of the samples.
+        """
+    @property
+    def dR(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        Rotation (3, 3) from the last frame of the IMU to the first.
+        """
+    @property
+    def dp(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Change of the position (3,) [m].
+        """
+    @property
+    def dt(self) -> float:
+        """
+        Duration [s].
+        """
+    @property
+    def dv(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Change of the velocity (3,) [m/s].
+        """
+    @property
+    def end(self) -> float:
+        """
+        Last moment [s].
+        """
+    @property
+    def longest_gap(self) -> float:
+        """
+        Longest gap [s]; 0 if there is none.
+        """
+    @property
+    def n_gaps(self) -> int:
+        """
+        Intervals longer than `max_gap`. Their noise is not averaged, and the covariance allows any rate between the two readings.
+        """
+    @property
+    def n_saturated_accel(self) -> int:
+        """
+        Samples with a reading at `accel_range`.
+        """
+    @property
+    def n_saturated_gyro(self) -> int:
+        """
+        Samples with a reading at `gyro_range`.
+        """
+    @property
+    def samples(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Samples (n, 7) it was integrated from, with those interpolated at the ends.
         """
 class Frame:
     """

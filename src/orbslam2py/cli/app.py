@@ -142,6 +142,11 @@ SUBCOMMANDS = {
         "import_camera",
         "Turn another program's calibration into a settings file.",
     ),
+    "check-imu": Subcommand(
+        "check_imu",
+        "check",
+        "Compare the IMU of a recording with its camera: axes, signs, units, clock, gravity.",
+    ),
     "config": Subcommand(
         "config", "show", "List the thresholds of the method, their defaults and what they mean."
     ),

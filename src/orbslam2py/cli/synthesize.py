@@ -164,6 +164,17 @@ def synthesize(
     overlap: Overlap = None,
     lateral: Annotated[float, typer.Option(help="Metres to the right of the usual path.")] = 0.0,
     yaw: Annotated[float, typer.Option(help="Degrees that the camera looks to the right.")] = 0.0,
+    imu: Annotated[
+        bool, typer.Option("--imu", help="Write samples of an IMU beside the camera, too.")
+    ] = False,
+    imu_noise: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CHIP",
+            help="Noise and bias of a chip in the samples, such as mpu6050, bmi088 or adis16448.  "
+            "[default: none]",
+        ),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Replace a synthetic sequence in the folder.")
     ] = False,
@@ -197,6 +208,8 @@ def synthesize(
         lateral=lateral,
         yaw=yaw,
         lens=None if lens is None else Settings.load(lens, Sensor.MONOCULAR).camera,
+        imu=imu,
+        imu_noise=imu_noise,
     )
     sequence = SyntheticSequence(options)
     console = Console(quiet=quiet)

@@ -16,6 +16,8 @@ from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
+from orbslam2py.datasets.imu import ImuSamples, imu_of
+from orbslam2py.datasets.imu_csv import AccelUnit, GyroUnit, read_imu_csv
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.layouts import (
     BonnSequence,
@@ -36,15 +38,18 @@ from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
+    "AccelUnit",
     "BagSequence",
     "BonnSequence",
     "DepthFolders",
     "EurocSequence",
     "Frame",
     "FramesInOrder",
+    "GyroUnit",
     "IclNuimSequence",
     "ImageFolder",
     "Images",
+    "ImuSamples",
     "IterableSequence",
     "KittiRawSequence",
     "KittiSequence",
@@ -65,8 +70,10 @@ __all__ = [
     "TumSequence",
     "VideoReader",
     "VideoSequence",
+    "imu_of",
     "is_recording",
     "open_input",
     "open_sequence",
+    "read_imu_csv",
     "recognise",
 ]

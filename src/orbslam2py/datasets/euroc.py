@@ -22,10 +22,18 @@ from orbslam2py.datasets.euroc_calibration import (
     read_sensor_yaml,
     stereo_settings,
 )
+from orbslam2py.datasets.imu import ImuSamples
+from orbslam2py.datasets.imu_csv import read_imu_csv
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import Sensor, Settings, StereoRectification
+from orbslam2py.settings import (
+    ImuSettings,
+    Sensor,
+    Settings,
+    StereoRectification,
+    read_imu_settings,
+)
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_euroc
 
 _log = logging.getLogger(__name__)
@@ -162,6 +170,18 @@ class EurocSequence(RecordedSequence):
             # R of the rectification turns raw into rectified coordinates.
             T_body_camera[:3, :3] = T_body_camera[:3, :3] @ rectification.left.R.T
         return Trajectory(body.timestamps, body.T_wc @ T_body_camera)
+
+    def imu(self) -> ImuSamples | None:
+        """Read ``imu0/data.csv``; see `RecordedSequence.imu`."""
+        path = self._root / "imu0" / "data.csv"
+        return read_imu_csv(path) if path.is_file() else super().imu()
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read ``sensor.yaml`` of IMU and left camera; see `RecordedSequence.imu_settings`."""
+        paths = [self._root / name / "sensor.yaml" for name in ("imu0", "cam0")]
+        if all(path.is_file() for path in paths):
+            return read_imu_settings(*paths)
+        return super().imu_settings()
 
     @cached_property
     def _rectifiers(self) -> tuple[Rectifier, Rectifier]:

@@ -28,9 +28,17 @@ from orbslam2py.datasets.grey_scale import (
     spread_over,
 )
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.imu import ImuSamples
+from orbslam2py.datasets.imu_csv import read_imu_csv
 from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import Sensor, Settings, resolve_settings
+from orbslam2py.settings import (
+    ImuSettings,
+    Sensor,
+    Settings,
+    read_imu_settings,
+    resolve_settings,
+)
 from orbslam2py.trajectory import Trajectory
 
 #: A sequence is refused if this number of frames at its beginning have no images.
@@ -161,6 +169,44 @@ class RecordedSequence(FramesInOrder, ABC):
     @abstractmethod
     def ground_truth(self) -> Trajectory | None:
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
+
+    def imu(self) -> ImuSamples | None:
+        """Read the samples of the IMU, each time anew; nothing is read before.
+
+        By default those of ``imu.csv`` in the folder; see `read_imu_csv`.
+
+        Returns
+        -------
+        ImuSamples or None
+            On the clock of `timestamps`, in rad/s and m/s^2; None if the recording has none.
+
+        Raises
+        ------
+        DatasetError
+            Naming the file and the line that is wrong.
+        """
+        path = self._beside("imu.csv")
+        return None if path is None else read_imu_csv(path)
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read what comes with the recording about its IMU; None if nothing does.
+
+        By default ``imu.yaml`` in the folder, with the keys of ORB-SLAM3; see `read_imu_settings`.
+
+        ``T_ci`` is for the unrectified camera.
+
+        Raises
+        ------
+        SettingsError
+            Naming the file and the key that is wrong.
+        """
+        path = self._beside("imu.yaml")
+        return None if path is None else read_imu_settings(path)
+
+    def _beside(self, name: str) -> Path | None:
+        """A file in the folders where settings are looked for."""
+        paths = (folder / name for folder in self._settings_folders())
+        return next((path for path in paths if path.is_file()), None)
 
     @cached_property
     def _rectifiers(self) -> Rectifiers | None:

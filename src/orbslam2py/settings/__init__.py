@@ -13,6 +13,9 @@ from orbslam2py.settings.groups import (
     StereoRectification,
     ViewerSettings,
 )
+from orbslam2py.settings.imu import ImuSettings
+from orbslam2py.settings.imu_files import read_imu_settings
+from orbslam2py.settings.imu_presets import ImuNoise, imu_noise
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, builtin_settings, resolve_settings
 
@@ -24,6 +27,8 @@ __all__ = [
     "CameraSettings",
     "DepthSettings",
     "FitThresholds",
+    "ImuNoise",
+    "ImuSettings",
     "Misfit",
     "OrbSettings",
     "Sensor",
@@ -31,6 +36,8 @@ __all__ = [
     "StereoRectification",
     "ViewerSettings",
     "builtin_settings",
+    "imu_noise",
+    "read_imu_settings",
     "resolve_settings",
     "settings_for_camera",
 ]

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_folder, failing_as
-from orbslam2py.datasets import Layout, Sequence
+from orbslam2py.datasets import ImuSamples, Layout, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.settings import CameraSettings, ImuSettings, Sensor
 from orbslam2py.synthetic.bag_files import BAG_LAYOUTS, BagContents, write_bag
+from orbslam2py.synthetic.imu import write_euroc_imu, write_imu
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
@@ -66,6 +67,14 @@ class WritableSequence(Sequence, Protocol):
     @property
     def nanoseconds(self) -> IntArray: ...  # noqa: D102
 
+    def imu(self) -> ImuSamples | None:
+        """Make the samples of the IMU; None if there is none."""
+        ...
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Return the settings of the IMU; None if there is none."""
+        ...
+
     def ground_truth(self) -> Trajectory:
         """Return the true pose of every frame: there is one for all."""
         ...
@@ -101,11 +110,15 @@ def write_sequence(
     progress: Progress | None = None,
 ) -> Path:
     """Write a sequence; see `SyntheticSequence.write`."""
+    if layout is None and sequence.options.imu and sequence.sensor is not Sensor.RGBD:
+        layout = Layout.EUROC
     chosen = choose_layout(layout, sequence.sensor)
     if sequence.options.lens is not None and chosen is not Layout.TUM:
         raise SettingsError(
             f"the layout {chosen} has no place for the lens of the camera; take the layout tum"
         )
+    if sequence.options.imu:
+        _check_imu(sequence, chosen)
     writers: dict[Layout, Callable[[WritableSequence, Path, Progress], None]] = {
         Layout.TUM: _write_tum,
         Layout.KITTI: _write_kitti,
@@ -115,11 +128,35 @@ def write_sequence(
     _check_replaceable(folder, force=force)
     with atomic_folder(folder) as temporary, failing_as(folder, temporary):
         writers[chosen](sequence, temporary, progress or (lambda done, total: None))
+        _write_imu(sequence, temporary, chosen)
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
+        if not sequence.options.imu:  # as before there were any
+            del about["imu"], about["imu_noise"]
         about[_ENTRIES] = {entry.name: _n_files(entry) for entry in sorted(temporary.iterdir())}
         _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
         _check_replaceable(folder, force=force)  # writing takes long: it may have been filled
     return folder
+
+
+def _check_imu(sequence: WritableSequence, layout: Layout) -> None:
+    if str(layout) in map(str, BAG_LAYOUTS):
+        raise SettingsError(
+            f"layout {layout} is written without an IMU; take euroc, tum or kitti, or leave out imu"
+        )
+    if len(sequence) < 3:
+        raise SettingsError(
+            f"{len(sequence)} frames make no path for an IMU; give 3 frames or more"
+        )
+
+
+def _write_imu(sequence: WritableSequence, folder: Path, layout: Layout) -> None:
+    samples, settings = sequence.imu(), sequence.imu_settings()
+    if samples is None or settings is None:
+        return
+    if layout is Layout.EUROC:
+        write_euroc_imu(folder / "mav0", samples, settings)
+    else:
+        write_imu(folder, samples, settings)
 
 
 # ---- layouts -------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import Any
 
 from orbslam2py._arguments import is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.settings import CameraSettings, Sensor, imu_noise
 from orbslam2py.synthetic.motions import SyntheticMotion
 from orbslam2py.synthetic.scenes import (
     CORNERED,
@@ -87,6 +87,12 @@ class SyntheticOptions:
         Camera with width and height, through whose lens the images are seen: any model that
         `orbslam2py.CameraSettings` has. One camera or RGB-D, without `blur` and `size`. None for a
         pinhole without distortion.
+    imu
+        Whether there is an IMU beside the camera. Its path is a smooth curve through the poses of
+        the images, which stay as they are; not with `pieces`, between which the camera jumps.
+    imu_noise
+        Name of a chip whose noise the samples have, such as ``bmi088``, with a bias that walks; by
+        default they are exact.
 
     Raises
     ------
@@ -118,6 +124,8 @@ class SyntheticOptions:
     overlap: float | None = None
     length: float | None = None
     lens: CameraSettings | None = None
+    imu: bool = False
+    imu_noise: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -143,6 +151,7 @@ class SyntheticOptions:
         _check_range("lateral", self.lateral, -beside, beside)
         _check_range("yaw", self.yaw, -180, 180)
         self._check_pace()
+        self._check_imu()
         if self.laps is not None and self.world not in LAPS:
             names = ", ".join(map(str, LAPS))
             raise SettingsError(
@@ -204,6 +213,18 @@ class SyntheticOptions:
             raise SettingsError(
                 "overlap is what pieces share, and there is only one; give more pieces, or leave "
                 "it out"
+            )
+
+    def _check_imu(self) -> None:
+        if not isinstance(self.imu, bool):
+            raise SettingsError(f"imu is {shown(self.imu)}; give True or False")
+        if self.imu_noise is not None:
+            if not self.imu:
+                raise SettingsError("imu_noise is that of an IMU; give imu (--imu) as well")
+            imu_noise(self.imu_noise)
+        if self.imu and self.pieces is not None:
+            raise SettingsError(
+                "the camera jumps between pieces, which no IMU can measure; leave out imu or pieces"
             )
 
     def _check_pace(self) -> None:

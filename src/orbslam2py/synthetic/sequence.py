@@ -30,6 +30,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic import lens
 from orbslam2py.synthetic.files import write_sequence
+from orbslam2py.synthetic.imu import SyntheticImu
 from orbslam2py.synthetic.motions import Motion, SyntheticMotion
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.synthetic.pieces import arrange
@@ -42,7 +43,7 @@ from orbslam2py.trajectory.rotations import inverse_poses
 DEPTH_PER_METRE = 5000.0
 
 
-class SyntheticSequence(FramesInOrder):
+class SyntheticSequence(SyntheticImu, FramesInOrder):
     """Renders its images when they are asked for; has the interface of the recorded sequences.
 
     Parameters
@@ -349,7 +350,8 @@ class SyntheticSequence(FramesInOrder):
         if options.blur > 0:
             sharp, depth = self._render(place(T_wc), number, 1.0, noise=0.0, seconds=seconds)
             half = 0.5 * options.blur / self._fps
-            T_open, T_shut = (place(self._T_wc_at(seconds + aside)) for aside in (-half, half))
+            pose = self.T_wc_between if options.imu else self._T_wc_at
+            T_open, T_shut = (place(pose(seconds + aside)) for aside in (-half, half))
             image = lens.smeared(sharp, depth, self.camera, T_open, place(T_wc), T_shut)
             grey = lens.exposed(image, exposure, options.noise, [options.seed, number])
         else:

@@ -24,6 +24,7 @@ IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 INFO = "sensor_msgs/msg/CameraInfo"
 FLOAT = "std_msgs/msg/Float32"
+IMU = "sensor_msgs/msg/Imu"
 STRING = "std_msgs/msg/String"
 TRANSFORM = "geometry_msgs/msg/Transform"
 TF = "tf2_msgs/msg/TFMessage"
@@ -105,6 +106,11 @@ def text(topic: str, stamp: int, content: str) -> Made:
     return Made(topic, STRING, stamp, (content,))
 
 
+def imu(topic: str, stamp: int, gyro: Sequence[float], accel: Sequence[float]) -> Made:
+    """A sample of an IMU that tells no orientation."""
+    return Made(topic, IMU, stamp, (gyro, accel), "imu")
+
+
 def transform(topic: str, T: npt.NDArray[np.float64]) -> Made:
     """A transform (4, 4) alone."""
     return Made(topic, TRANSFORM, START, (T,))
@@ -158,6 +164,12 @@ def message_of(store: Any, made: Made, *, ros1: bool) -> Any:
     if made.kind == TF:
         return types[TF]([_edge_of(types, *edge, ros1=ros1) for edge in made.fields])
     fields = list(made.fields)
+    if made.kind == IMU:
+        vector = types["geometry_msgs/msg/Vector3"]
+        turned = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+        gyro, accel = (vector(*map(float, one)) for one in made.fields)
+        unknown = np.full(9, -1.0)
+        fields = [turned, unknown, gyro, unknown, accel, unknown]
     if made.kind == INFO:
         fields[-1] = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
     time = types["builtin_interfaces/msg/Time"](made.stamp // 10**9, made.stamp % 10**9)

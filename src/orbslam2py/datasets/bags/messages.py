@@ -13,6 +13,7 @@ from orbslam2py.errors import DatasetError
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+IMU = "sensor_msgs/msg/Imu"
 #: Types of messages that may hold true poses.
 POSES = (
     "geometry_msgs/msg/PoseStamped",

@@ -20,6 +20,7 @@ from orbslam2py.datasets.bags.bag import Bag, Message
 from orbslam2py.datasets.bags.calibration import settings_of_camera, settings_of_pair
 from orbslam2py.datasets.bags.depth_cameras import find_depth_camera
 from orbslam2py.datasets.bags.image_topics import ImageTopic
+from orbslam2py.datasets.bags.imu import read_imu
 from orbslam2py.datasets.bags.infos import read_info
 from orbslam2py.datasets.bags.messages import read_message
 from orbslam2py.datasets.bags.pixels import (
@@ -43,6 +44,7 @@ from orbslam2py.datasets.base import Images, choose_sensor, rate_of
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.grey_scale import GreyScale, spread_over
+from orbslam2py.datasets.imu import ImuSamples
 from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.datasets.registration import DepthRegistration
 from orbslam2py.errors import DatasetError, ImageError
@@ -177,6 +179,16 @@ class BagSequence(FramesInOrder):
         """Read the poses of the topic ``truth``; see `datasets.base.Sequence.ground_truth`."""
         topic = self.topics.truth
         return None if topic is None else read_poses(self._bag, topic)
+
+    def imu(self) -> ImuSamples | None:
+        """Read the samples of the IMU, each time anew; None if the bag has none.
+
+        Raises
+        ------
+        DatasetError
+            If they cannot be read.
+        """
+        return read_imu(self._bag)
 
     # ---- images ----------------------------------------------------------------------------------
     @property

@@ -17,8 +17,9 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.clock import read_clock
 from orbslam2py.datasets.grey_scale import read_sample
 from orbslam2py.datasets.image_folder import image_files
+from orbslam2py.datasets.imu import ImuSamples, make_samples
 from orbslam2py.datasets.layouts.kitti_raw_calibration import CAMERAS_FILE, DriveCalibration
-from orbslam2py.datasets.layouts.kitti_raw_poses import read_oxts
+from orbslam2py.datasets.layouts.kitti_raw_poses import read_oxts, read_oxts_imu
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
@@ -143,6 +144,18 @@ class KittiRawSequence(RecordedSequence):
         numbers, T_w_imu = read_oxts(self.folder / "oxts" / "data", len(stamps.texts))
         T_camera_imu = self._calibration.T_camera_imu(self._left, raw=self._is_raw_mono)
         return Trajectory(stamps.seconds[numbers], T_w_imu @ np.linalg.inv(T_camera_imu))
+
+    def imu(self) -> ImuSamples | None:
+        """Read accelerations and angular rates of ``oxts``; see `RecordedSequence.imu`.
+
+        x points forward, y left, z up. Synchronised drives have 10 samples a second, others 100.
+        """
+        data = self.folder / "oxts" / "data"
+        if not data.is_dir():
+            return super().imu()
+        stamps = _read_dates(self.folder / "oxts" / "timestamps.txt")
+        numbers, readings = read_oxts_imu(data, len(stamps.texts))
+        return make_samples(str(data), np.column_stack([stamps.seconds[numbers], readings]))
 
     # ---- files -----------------------------------------------------------------------------------
     def _camera_folder(self, camera: int) -> Path:

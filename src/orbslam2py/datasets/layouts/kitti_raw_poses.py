@@ -14,6 +14,8 @@ from orbslam2py.trajectory.rotations import poses_from
 
 _EARTH_RADIUS = 6378137.0  # metres, WGS 84
 _FIELDS = 6
+#: With the accelerations and the angular rates, which come after the velocities.
+_IMU_FIELDS = 20
 
 
 def read_oxts(folder: Path, n_times: int) -> tuple[list[int], FloatArray]:
@@ -37,15 +39,7 @@ def read_oxts(folder: Path, n_times: int) -> tuple[list[int], FloatArray]:
     DatasetError
         Naming the file.
     """
-    files = sorted(path for path in folder.glob("*.txt") if path.stem.isdecimal())
-    if not files:
-        raise DatasetError(f"{folder} has no packets (0000000000.txt ...); take oxts away")
-    numbers = [int(path.stem) for path in files]
-    if numbers[-1] >= n_times:
-        raise DatasetError(
-            f"{folder.parent / 'timestamps.txt'} holds {n_times} time stamps, but there is "
-            f"{files[-1]}; copy the drive's own file there, or take oxts away"
-        )
+    files, numbers = _packets(folder, n_times)
     values = np.array([_values(path) for path in files])
     latitude, longitude = np.radians(values[:, 0]), np.radians(values[:, 1])
     scale = _EARTH_RADIUS * np.cos(latitude[0])
@@ -56,13 +50,50 @@ def read_oxts(folder: Path, n_times: int) -> tuple[list[int], FloatArray]:
     return numbers, poses_from(R, positions - positions[0])
 
 
-def _values(path: Path) -> list[float]:
+def read_oxts_imu(folder: Path, n_times: int) -> tuple[list[int], FloatArray]:
+    """Read angular rates [rad/s] and accelerations [m/s^2] of the packets of a drive.
+
+    Parameters
+    ----------
+    folder, n_times
+        As for `read_oxts`.
+
+    Returns
+    -------
+    numbers, readings
+        Numbers of the packets, and rows wx, wy, wz, ax, ay, az, (n, 6); x points forward, y left,
+        z up.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file.
+    """
+    files, numbers = _packets(folder, n_times)
+    values = np.array([_values(path, _IMU_FIELDS) for path in files])
+    return numbers, np.hstack([values[:, 17:20], values[:, 11:14]])
+
+
+def _packets(folder: Path, n_times: int) -> tuple[list[Path], list[int]]:
+    files = sorted(path for path in folder.glob("*.txt") if path.stem.isdecimal())
+    if not files:
+        raise DatasetError(f"{folder} has no packets (0000000000.txt ...); take oxts away")
+    numbers = [int(path.stem) for path in files]
+    if numbers[-1] >= n_times:
+        raise DatasetError(
+            f"{folder.parent / 'timestamps.txt'} holds {n_times} time stamps, but there is "
+            f"{files[-1]}; copy the drive's own file there, or take oxts away"
+        )
+    return files, numbers
+
+
+def _values(path: Path, n_fields: int = _FIELDS) -> list[float]:
     for line in content_lines(path)[:1]:
-        if len(line.fields) >= _FIELDS:
-            return [number_of(path, line, field) for field in line.fields[:_FIELDS]]
+        if len(line.fields) >= n_fields:
+            return [number_of(path, line, field) for field in line.fields[:n_fields]]
     raise DatasetError(
-        f"{path} does not begin with latitude, longitude, altitude, roll, pitch and yaw; copy it "
-        "anew, or take oxts away"
+        f"{path} does not begin with latitude, longitude, altitude, roll, pitch and yaw"
+        f"{' and all readings' if n_fields > _FIELDS else ''}; copy it anew, or take oxts away"
     )
 
 

@@ -11,6 +11,8 @@ import yaml
 
 from orbslam2py._arguments import cannot_open
 from orbslam2py.datasets.base import Layout, Stamps
+from orbslam2py.datasets.imu import ImuSamples, joined_streams
+from orbslam2py.datasets.imu_csv import read_stream
 from orbslam2py.datasets.layouts.frames_on_disk import DepthSequence
 from orbslam2py.datasets.tum import read_image_list
 from orbslam2py.errors import DatasetError
@@ -20,6 +22,7 @@ from orbslam2py.trajectory import Trajectory, associate, read_tum
 _log = logging.getLogger(__name__)
 
 _COLOUR, _DEPTH, _CAMERAS = "color.txt", "aligned_depth.txt", "sensors.yaml"
+_IMU = "d400_gyroscope.txt", "d400_accelerometer.txt"
 _SENSOR = "d400_color_optical_frame"
 _DEPTH_PER_METRE = 1000.0
 
@@ -59,6 +62,16 @@ class OpenLorisSequence(DepthSequence):
         """Read ``groundtruth.txt``; see `datasets.base.Sequence.ground_truth`."""
         path = self.folder / "groundtruth.txt"
         return read_tum(path) if path.is_file() else None
+
+    def imu(self) -> ImuSamples | None:
+        """Read the gyro and the accelerometer of the camera; see `RecordedSequence.imu`.
+
+        The accelerometer is interpolated at the times of the gyro.
+        """
+        gyro, accel = (self.folder / name for name in _IMU)
+        if not gyro.is_file() or not accel.is_file():
+            return super().imu()
+        return joined_streams(str(self.folder), read_stream(gyro), read_stream(accel))
 
     def _from_calibration(self) -> Settings | None:
         path = self.folder / _CAMERAS

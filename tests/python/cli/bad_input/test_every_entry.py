@@ -23,7 +23,7 @@ pytestmark = pytest.mark.watchdog(60)
 
 TABLE = Path(__file__).with_name("entries.txt")
 COMMANDS = {
-    *("run", "demo", "evaluate", "synthesize", "calibrate", "import-camera"),
+    *("run", "demo", "evaluate", "synthesize", "calibrate", "check-imu", "import-camera"),
     *("settings new", "settings show", "settings check", "settings list"),
     *("vocabulary train", "vocabulary convert", "vocabulary info"),
 }

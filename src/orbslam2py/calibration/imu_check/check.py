@@ -1,0 +1,439 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The verdict on an IMU: what is wrong, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.calibration.imu_check import streams
+from orbslam2py.calibration.imu_check.gravity import GravityFit, fit_gravity
+from orbslam2py.calibration.imu_check.rates import (
+    MeanGyro,
+    RateFit,
+    axes_text,
+    camera_rates,
+    fit_rates,
+    signed_permutations,
+)
+from orbslam2py.datasets import ImuSamples
+from orbslam2py.settings import ImuSettings
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
+
+_DEGREE = float(np.pi / 180)
+#: Least number of steps of the camera that are compared.
+_STEPS = 15
+#: Rotation of the camera about its mean [rad/s], root mean square, that is enough to compare.
+_TURNING = 0.08
+#: Share of the camera's rotation that a gyro that belongs to it explains.
+_EXPLAINED = 0.8
+#: Time offset [s] and angle [rad] that do no harm.
+_SMALL_OFFSET, _SMALL_ANGLE = 5e-3, 3 * _DEGREE
+#: Relative error of a scale, or of gravity, that may be one of the path.
+_SMALL_SCALE = 0.1
+#: Usual length of the specific force [m/s^2], beyond which its unit is wrong.
+_ODD_FORCE = (4.0, 30.0)
+#: Difference of an accelerometer's misfits [m] that may be one of the path.
+_SMALL_MISFIT = 5e-3
+#: Norm of the difference of two rotations that are 16 degrees apart.
+_SAME_AXES = 0.4
+_READINGS = ("gyro", "accelerometer")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of an IMU, or of its settings.
+
+    Attributes
+    ----------
+    kind
+        A short name: ``time_offset``, ``axes``, ``inverse``, ``rotation``, ``degrees``, ``g``,
+        ``scale``, ``swapped``, ``dead``, ``saturated``, ``sign`` or ``unrelated``.
+    text
+        What is wrong and the likely remedy.
+    """
+
+    kind: str
+    text: str
+
+
+@dataclass
+class ImuReport:
+    """What `check_imu` found.
+
+    Attributes
+    ----------
+    faults
+        All faults; none if the IMU fits.
+    notes
+        What was measured, one sentence each.
+    open_questions
+        What could not be checked, and why.
+    rates
+        The gyro beside the camera; None if it could not be compared.
+    gravity
+        The accelerometer beside the path; None if it could not be compared.
+    """
+
+    faults: list[Finding] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    open_questions: list[str] = field(default_factory=list)
+    rates: RateFit | None = None
+    gravity: GravityFit | None = None
+
+    @property
+    def fits(self) -> bool:
+        """Whether no fault was found."""
+        return not self.faults
+
+    def blame(self, kind: str, text: str) -> None:
+        """Add a fault."""
+        self.faults.append(Finding(kind, text))
+
+
+def check_imu(
+    samples: ImuSamples,
+    paths: Sequence[Trajectory],
+    settings: ImuSettings | None = None,
+    *,
+    reach: float = 0.5,
+) -> ImuReport:
+    """Compare an IMU with the path of the camera.
+
+    Parameters
+    ----------
+    samples
+        Of the IMU.
+    paths
+        Of the camera, one per map; scales do not matter.
+    settings
+        What is believed of the IMU, for the camera that the paths are of; None if nothing is.
+    reach
+        Time offsets [s] that are tried, before and after that of the settings.
+    """
+    report = ImuReport()
+    _describe(report, samples)
+    gyro, accel = _checked_streams(report, samples)
+    t = samples.timestamps
+    believed = 0.0 if settings is None else settings.time_offset
+    camera = camera_rates(paths)
+    if not len(camera):
+        report.open_questions.append(
+            "the camera was not tracked, so axes and time offset could not be checked; record 10 s "
+            "with turns about all axes and sideways motion"
+        )
+        return report
+    if camera.end[-1] + believed < t[0] - reach or camera.begin[0] + believed > t[-1] + reach:
+        report.blame(
+            "time_offset",
+            f"images ({camera.begin[0]:.3f} s to {camera.end[-1]:.3f} s) and samples ({t[0]:.3f} s "
+            f"to {t[-1]:.3f} s) have no time in common: the clocks differ, or the files belong to "
+            f"different recordings; if both began together, the time offset is "
+            f"{t[0] - camera.begin[0]:.3f} s",
+        )
+        return report
+    rates = fit_rates(camera, MeanGyro(t, gyro), believed, reach, _STEPS)
+    if rates is None:
+        report.open_questions.append(
+            f"fewer than {_STEPS} steps of the camera lie inside the samples; record a longer piece"
+        )
+        return report
+    report.rates = rates
+    follows = _check_following(report, rates)
+    offset = rates.offset if follows else believed
+    T_ci = None if settings is None else settings.T_ci
+    if follows:
+        _check_clock(report, rates, believed)
+        _check_scale(report, rates)
+        T_ci = _check_axes(report, rates, settings)
+    if T_ci is not None:
+        _check_gravity(report, t, accel, _longest(paths), T_ci, offset, settings)
+    return report
+
+
+# ---- the samples alone ---------------------------------------------------------------------------
+
+
+def _describe(report: ImuReport, samples: ImuSamples) -> None:
+    steps = np.diff(samples.timestamps)
+    text = f"{len(samples)} samples, {np.sum(steps):.1f} s, {samples.rate:.4g} Hz"
+    gaps = steps[steps > max(5 * float(np.median(steps)), 0.03)]
+    if len(gaps):
+        text += f", {len(gaps)} gaps, the longest {gaps.max() * 1e3:.0f} ms"
+    report.notes.append(text)
+
+
+def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray, FloatArray]:
+    """Check the readings alone; returns the gyro as it is, and the accelerometer in m/s^2."""
+    gyro, accel = samples.gyro, samples.accel
+    if streams.swapped(gyro, accel):
+        report.blame(
+            "swapped",
+            "gyro and accelerometer are exchanged: the gyro's columns hold gravity; exchange the "
+            "columns",
+        )
+        gyro, accel = accel, gyro
+    for name, readings in zip(_READINGS, (gyro, accel), strict=True):
+        dead = streams.dead_axes(readings)
+        if dead:
+            report.blame(
+                "dead",
+                f"axis {', '.join(dead)} of the {name} never changes: it is dead, or its column "
+                "is not filled; check wiring, driver and columns",
+            )
+        for axis, values in zip("xyz", readings.T, strict=True):
+            n = int(streams.saturated(values).sum())
+            if n:
+                top = float(np.abs(values).max())
+                report.blame(
+                    "saturated",
+                    f"axis {axis} of the {name} is saturated at {top:.4g} in {n} samples; choose "
+                    "a larger range of the IMU, or move more gently",
+                )
+    unit = streams.accel_unit(accel)
+    length = float(np.median(np.linalg.norm(accel, axis=1)))
+    if unit == "g":
+        report.blame(
+            "g",
+            f"the accelerometer reads {length:.3g} where gravity is 9.81 m/s^2: it is in g; "
+            "multiply by 9.81, or give --accel-unit g",
+        )
+        return gyro, accel * streams.GRAVITY
+    low, high = _ODD_FORCE
+    if not low < length < high:
+        report.blame(
+            "scale",
+            f"the accelerometer usually reads {length:.4g}, but gravity is 9.81 m/s^2; correct its "
+            f"unit (a factor of {streams.GRAVITY / max(length, 1e-9):.3g}), or add gravity if "
+            "these are accelerations without it",
+        )
+        if length > 0.5:
+            return gyro, accel * (streams.GRAVITY / length)
+    else:
+        report.notes.append(f"accelerometer: usually {length:.2f} m/s^2 (gravity 9.81)")
+    return gyro, accel
+
+
+# ---- the gyro ------------------------------------------------------------------------------------
+
+
+def _check_following(report: ImuReport, rates: RateFit) -> bool:
+    """Whether the gyro follows the camera well enough to tell axes and clock."""
+    if rates.explained >= _EXPLAINED and rates.camera_rms > 0.5 * _TURNING:
+        return True
+    damaged = any(fault.kind in ("dead", "swapped") for fault in report.faults)
+    gyro_turns = rates.gyro_rms > 0.15 and rates.gyro_rms > 3 * rates.camera_rms
+    if rates.camera_rms > 2 * _TURNING or gyro_turns:
+        if not damaged:
+            report.blame(
+                "unrelated",
+                f"the gyro explains only {100 * rates.explained:.0f} % of the camera's rotation: "
+                "the samples may be of another recording, the time offset larger than was tried "
+                "(--reach), or the video stabilised; record without stabilisation",
+            )
+        return False
+    report.open_questions.append(
+        f"the camera turns too little ({rates.camera_rms:.2f} rad/s) to check axes and time "
+        "offset; record 10 s with turns about all axes"
+    )
+    return False
+
+
+def _check_clock(report: ImuReport, rates: RateFit, believed: float) -> None:
+    late = rates.offset - believed
+    report.notes.append(
+        f"time offset: {rates.offset * 1e3:+.1f} ms (+/- {rates.offset_deviation * 1e3:.1f}), to "
+        "be added to the times of the images"
+    )
+    if abs(late) > max(_SMALL_OFFSET, 4 * rates.offset_deviation):
+        report.blame(
+            "time_offset",
+            f"the clocks of images and IMU differ by {rates.offset * 1e3:+.1f} ms, but "
+            f"{believed * 1e3:g} ms were expected; set the time offset (Kalibr's "
+            f"timeshift_cam_imu) to {rates.offset:.4f} s",
+        )
+
+
+def _check_scale(report: ImuReport, rates: RateFit) -> None:
+    factor = rates.scale
+    if any(fault.kind == "saturated" for fault in report.faults):
+        return
+    if abs(factor / _DEGREE - 1) < 0.25:
+        report.blame(
+            "degrees",
+            f"the gyro reads {1 / factor:.1f} times the camera's rotation rate: it is in degrees "
+            "per second; multiply by 0.0174533, or give --gyro-unit deg/s",
+        )
+    elif abs(factor - 1) > _SMALL_SCALE:
+        report.blame(
+            "scale",
+            f"the gyro reads {1 / factor:.3g} times the camera's rotation rate; correct its unit "
+            "or scale, or the focal length of the camera",
+        )
+    else:
+        report.notes.append(f"gyro: {1 / factor:.3f} times the camera's rotation rate")
+    unit = _DEGREE if abs(factor / _DEGREE - 1) < 0.25 else 1.0
+    bias = ", ".join(f"{value * unit:.4f}" for value in rates.bias)
+    report.notes.append(f"bias of the gyro: {bias} rad/s")
+
+
+def _check_axes(
+    report: ImuReport, rates: RateFit, settings: ImuSettings | None
+) -> FloatArray | None:
+    """Compare the rotation with that of the settings; returns ``T_ci`` for the accelerometer."""
+    if any(fault.kind == "dead" for fault in report.faults):
+        return None if settings is None else settings.T_ci
+    mirrored = float(np.linalg.det(rates.M)) < 0 and _worse(rates, rates.R, rates.M)
+    best = np.eye(4)
+    best[:3, :3] = rates.R
+    known = rates.R_deviation < 5 * _DEGREE
+    if settings is None:
+        if mirrored:
+            report.blame(
+                "axes",
+                "the gyro is mirrored: one or all of its axes have the wrong sign; correct the "
+                "sign, or give --imu-settings, which tells which one",
+            )
+            return None
+        report.notes.append(f"rotation from IMU to camera: {_matrix_text(rates.R)}")
+        if not known:
+            report.open_questions.append(
+                "the camera turned about one axis only, so the rotation to the IMU is not certain"
+            )
+        return best if known else None
+    R = settings.T_ci[:3, :3]
+    angle = float(rotation_angles((R.T @ rates.R)[None])[0])
+    if not _worse(rates, R, rates.M) or (angle < _SMALL_ANGLE and not mirrored):
+        precision = rates.R_deviation / _DEGREE
+        report.notes.append(
+            f"rotation from IMU to camera: {angle / _DEGREE:.1f} degrees from the settings "
+            f"(+/- {precision:.1f})"
+        )
+        return settings.T_ci
+    if not _worse(rates, R.T, rates.M):
+        P = min(signed_permutations(), key=lambda P: float(np.linalg.norm(R @ P - R.T)))
+        same = np.linalg.norm(R @ P - R.T) < _SAME_AXES
+        report.blame(
+            "inverse",
+            "the rotation between camera and IMU in the settings is the inverse of the right one; "
+            "invert the whole matrix (IMU.T_b_c1 is from camera to IMU, T_cam_imu from IMU to "
+            "camera)" + (f", or the axes of the samples are wrong: {axes_text(P)}" if same else ""),
+        )
+        return np.asarray(inverse_poses(settings.T_ci))
+    return _other_axes(report, rates, settings, angle)
+
+
+def _other_axes(
+    report: ImuReport, rates: RateFit, settings: ImuSettings, angle: float
+) -> FloatArray | None:
+    R = settings.T_ci[:3, :3]
+    P = min(signed_permutations(), key=lambda P: rates.misfit(R @ P))
+    turned: FloatArray = settings.T_ci.copy()
+    turned[:3, :3] = rates.R
+    if np.linalg.norm(R @ P - rates.M) < _SAME_AXES:
+        text = (
+            f"the axes of the gyro are exchanged or have wrong signs: it fits with {axes_text(P)}"
+        )
+        if np.linalg.det(P) < 0:
+            report.blame("axes", f"{text}; correct these columns of the samples")
+            return settings.T_ci
+        report.blame(
+            "axes",
+            f"{text}; correct these columns, or, if the accelerometer has the same axes, give the "
+            f"rotation from IMU to camera: {_matrix_text(rates.R)}",
+        )
+        return turned
+    report.blame(
+        "rotation",
+        f"the rotation between camera and IMU in the settings is {angle / _DEGREE:.0f} degrees "
+        f"off; the rotation from IMU to camera that fits is {_matrix_text(rates.R)}",
+    )
+    return turned
+
+
+def _worse(rates: RateFit, M: FloatArray, best: FloatArray) -> bool:
+    """Whether a matrix fits clearly worse than the best one."""
+    a, b = rates.misfit(M), max(rates.misfit(best), 1e-10)
+    return a > 1.5 * b and (a - b) / b * rates.camera.size > 30
+
+
+def _matrix_text(R: FloatArray) -> str:
+    rows = ["[" + ", ".join(f"{value:.4f}" for value in row) + "]" for row in R]
+    return "[" + ", ".join(rows) + "]"
+
+
+# ---- the accelerometer ---------------------------------------------------------------------------
+
+
+def _longest(paths: Sequence[Trajectory]) -> Trajectory:
+    """The longest piece of a path without a gap."""
+    best: Trajectory | None = None
+    for path in paths:
+        good = np.flatnonzero(~path.lost)
+        cuts = np.flatnonzero((np.diff(good) > 1) | (np.diff(path.timestamps[good]) > 0.3)) + 1
+        for piece in np.split(good, cuts):
+            if best is None or len(piece) > len(best):
+                best = Trajectory(path.timestamps[piece], path.T_wc[piece])
+    assert best is not None
+    return best
+
+
+def _check_gravity(
+    report: ImuReport,
+    t: FloatArray,
+    accel: FloatArray,
+    path: Trajectory,
+    T_ci: FloatArray,
+    offset: float,
+    settings: ImuSettings | None,
+) -> None:
+    if any(fault.kind == "dead" and "accelerometer" in fault.text for fault in report.faults):
+        return
+    fit = fit_gravity(t, accel, path, T_ci, offset)
+    if fit is None:
+        report.open_questions.append("the path is too short to compare the accelerometer with it")
+        return
+    if settings is not None and T_ci is not settings.T_ci:
+        # The gyro asks for another rotation than the settings; whose side does gravity take?
+        other = fit_gravity(t, accel, path, settings.T_ci, offset)
+        if other is not None and other.misfit < 0.5 * fit.misfit:
+            report.notes.append("the accelerometer fits the settings: only the gyro differs")
+            fit = other
+    report.gravity = fit
+    if _axes_differ(fit):
+        if np.array_equal(fit.best_axes, -np.eye(3)):
+            report.blame(
+                "sign",
+                "the accelerometer has the wrong sign: at rest it must point up, as a force does; "
+                "multiply its columns by -1",
+            )
+        else:
+            report.blame(
+                "axes",
+                "the axes of the accelerometer are exchanged or have wrong signs: it fits with "
+                f"{axes_text(fit.best_axes)}; correct these columns of the samples",
+            )
+        return
+    report.notes.append(
+        f"gravity along the path: {fit.magnitude:.2f} m/s^2, {fit.misfit * 1e3:.0f} mm left over; "
+        f"one unit of the path is {fit.scale:.3f} m (+/- {fit.scale_deviation:.3f})"
+    )
+    certain = fit.misfit < 0.05
+    if certain and abs(fit.magnitude / streams.GRAVITY - 1) > _SMALL_SCALE:
+        report.blame(
+            "scale",
+            f"gravity comes out as {fit.magnitude:.2f} m/s^2; correct the scale or the bias of the "
+            "accelerometer",
+        )
+
+
+def _axes_differ(fit: GravityFit) -> bool:
+    return (
+        not np.array_equal(fit.best_axes, np.eye(3))
+        and fit.misfit > 2 * fit.best_misfit
+        and fit.misfit - fit.best_misfit > _SMALL_MISFIT
+    )

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Faults that the samples of an IMU show without a camera: dead and saturated axes, units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+
+_AXES = "xyz"
+GRAVITY = 9.81  # m/s^2
+#: Length of the specific force [m/s^2] that is gravity by its size, also in motion.
+_NEAR_GRAVITY = (7.0, 13.0)
+#: Samples without any change, from which on an axis is dead.
+_DEAD = 20
+#: Samples in a row at the largest value, from which on it may be the end of the range.
+_FLAT = 4
+#: Change [share of what the axis covers] before such a row, which a smooth peak does not have.
+_STEEP = 3e-3
+
+
+def swapped(gyro: FloatArray, accel: FloatArray) -> bool:
+    """Whether the readings (n, 3) of the gyro are those of the accelerometer and the reverse."""
+    low, high = _NEAR_GRAVITY
+    lengths = [np.linalg.norm(one, axis=1) for one in (gyro, accel)]
+    g, a = (float(np.median(one)) for one in lengths)
+    steady = float(lengths[1].std()) / max(a, 1e-9) < float(lengths[0].std()) / max(g, 1e-9)
+    # Beside a gyro that turns with 10 degrees/s, gravity of 1 g is there, steadier than the gyro.
+    return low < g < high and a < 5 and not (0.7 < a < 1.3 and steady)
+
+
+def dead_axes(readings: FloatArray) -> list[str]:
+    """Names of the axes of readings (n, 3) that never change."""
+    if len(readings) < _DEAD:
+        return []
+    return [name for name, axis in zip(_AXES, readings.T, strict=True) if np.ptp(axis) == 0]
+
+
+def saturated(axis: FloatArray) -> FloatArray:
+    """Find the samples of an axis (n,) that lie at the end of its range, bool (n,).
+
+    There the reading is the largest one for many samples in a row, and is reached with a step. How
+    long a row must be depends on how often neighbours are equal elsewhere, as they are in coarse
+    readings at rest.
+    """
+    found = np.zeros(len(axis), dtype=bool)
+    for sign in (1.0, -1.0):
+        values = sign * axis
+        top = float(values.max(initial=0.0))
+        if top <= 0:
+            continue
+        at_top = values >= top * (1 - 1e-6)
+        equal = (np.diff(values) == 0)[~at_top[1:]]
+        share = min(0.95, (equal.sum() + 1) / (len(equal) + 2))
+        least = max(_FLAT, 2 + int(np.log(1e3 * len(axis)) / -np.log(share)))
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], at_top, [False]]).astype(int)))
+        for begin, end in edges.reshape(-1, 2):
+            around = [values[k] for k in (begin - 1, end) if 0 <= k < len(values)]
+            if end - begin >= least and around and top - min(around) > _STEEP * float(np.ptp(axis)):
+                found |= at_top
+    return np.asarray(found)
+
+
+def accel_unit(accel: FloatArray) -> str:
+    """Tell the unit of an accelerometer by the usual length: ``m/s^2``, ``g`` or empty."""
+    length = float(np.median(np.linalg.norm(accel, axis=1)))
+    if _NEAR_GRAVITY[0] < length < _NEAR_GRAVITY[1]:
+        return "m/s^2"
+    return "g" if _NEAR_GRAVITY[0] < length * GRAVITY < _NEAR_GRAVITY[1] else ""

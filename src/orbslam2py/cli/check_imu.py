@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py check-imu``: compares the IMU of a recording with its camera."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from orbslam2py._figures import check_picture_name
+from orbslam2py.calibration.imu_check import ImuReport, check_imu, draw_imu_check
+from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.run_options import (
+    FpsOption,
+    QuietFlag,
+    SensorOption,
+    SequenceArgument,
+    SettingsOption,
+    TimesOption,
+    TopicsOption,
+    VocabularyOption,
+)
+from orbslam2py.cli.targets import check_apart, check_target
+from orbslam2py.datasets import (
+    AccelUnit,
+    FramesInOrder,
+    GyroUnit,
+    IterableSequence,
+    imu_of,
+    open_input,
+    read_imu_csv,
+)
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.settings import ImuSettings, Sensor, imu_noise, read_imu_settings
+from orbslam2py.settings.imu_files import has_imu_keys
+from orbslam2py.slam.system import System
+from orbslam2py.trajectory import Trajectory
+
+EXAMPLE = """
+**Example**
+
+    orbslam2py check-imu MH_01_easy --sensor mono
+
+    orbslam2py check-imu phone.mp4 --imu samples.csv --gyro-unit deg/s --settings camera.yaml
+
+    orbslam2py check-imu drive --imu-settings camchain-imucam.yaml --imu-settings imu.yaml
+"""
+
+
+def check(
+    sequence: SequenceArgument,
+    sensor: SensorOption = None,
+    settings: SettingsOption = None,
+    imu_settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="IMU settings of ORB-SLAM3, Kalibr, EuRoC or Basalt; twice for two files that "
+            "complete each other [those of --settings, or of the recording].",
+            metavar="FILE",
+        ),
+    ] = None,
+    imu_chip: Annotated[
+        str | None,
+        typer.Option(
+            "--imu-noise",
+            help="Name of the chip, such as bmi088, if the files do not tell the noise.",
+            metavar="CHIP",
+        ),
+    ] = None,
+    imu: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table with the samples: time, gyro x y z, accelerometer x y z [those of the "
+            "recording].",
+            metavar="FILE",
+        ),
+    ] = None,
+    gyro_unit: Annotated[
+        GyroUnit | None, typer.Option(help="Unit of the gyro in --imu [its header, or rad/s].")
+    ] = None,
+    accel_unit: Annotated[
+        AccelUnit | None,
+        typer.Option(help="Unit of the accelerometer in --imu [its header, or m/s^2]."),
+    ] = None,
+    fps: FpsOption = None,
+    times: TimesOption = None,
+    topics: TopicsOption = None,
+    vocabulary: VocabularyOption = None,
+    seconds: Annotated[
+        float, typer.Option(help="Length of the recording that is tracked.", min=1.0)
+    ] = 60.0,
+    reach: Annotated[
+        float,
+        typer.Option(help="Largest time offset that is tried [s].", min=0.01, max=60.0),
+    ] = 0.5,
+    plot: Annotated[
+        Path | None, typer.Option(help="Picture to write: rates of camera and gyro, gravity.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing picture.")] = False,
+    quiet: QuietFlag = False,
+) -> None:
+    """Track the images and compare the IMU with the camera: axes, signs, units, clock, gravity.
+
+    Exit code 0 if it fits, 1 if a fault was found, 2 if the input is wrong.
+    """
+    log_to(Console(stderr=True), quiet=quiet)
+    if imu is None and (gyro_unit or accel_unit):
+        raise SettingsError(
+            "--gyro-unit and --accel-unit are for the table of --imu; give it, or leave them out"
+        )
+    if plot is not None:
+        check_picture_name(plot, "--plot")
+        check_apart({"--plot": plot}, [] if imu is None else [imu])
+    check_target(plot, force=force)
+    images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, topics=topics)
+    if not isinstance(images, FramesInOrder):
+        raise DatasetError(
+            f"{sequence} is a camera, whose IMU is not read; record it first, and check that"
+        )
+    samples = (
+        imu_of(images)
+        if imu is None
+        else read_imu_csv(imu, gyro_unit=gyro_unit, accel_unit=accel_unit)
+    )
+    if samples is None:
+        raise DatasetError(
+            f"{sequence} has no samples of an IMU; give a table with --imu FILE (time, gyro x y z, "
+            "accelerometer x y z)"
+        )
+    believed = _believed(images, settings, imu_settings, imu_chip)
+    paths = _tracked(images, vocabulary, seconds)
+    report = check_imu(samples, paths, believed, reach=reach)
+    if plot is not None:
+        draw_imu_check(plot, report, samples, title=f"IMU of {Path(sequence).name}")
+    _print(report, believed, plot, quiet=quiet)
+    raise typer.Exit(ExitCode.OK if report.fits else ExitCode.FAILED)
+
+
+check.__doc__ = f"{check.__doc__}\n{EXAMPLE}"
+
+
+def _believed(
+    images: IterableSequence, settings: str | None, files: list[str] | None, chip: str | None
+) -> ImuSettings | None:
+    """The IMU settings for the camera of the images; None if there are none."""
+    noise = None if chip is None else imu_noise(chip)
+    found: ImuSettings | None = None
+    if files:
+        found = read_imu_settings(*files, noise=noise)
+    elif settings is not None and Path(settings).is_file() and has_imu_keys(Path(settings)):
+        found = read_imu_settings(settings, noise=noise)
+    elif (of_recording := getattr(images, "imu_settings", None)) is not None:
+        found = of_recording()
+    rectification = images.settings.rectification
+    if found is None or images.sensor is not Sensor.STEREO or rectification is None:
+        return found
+    return found.seen_by(rectification.left.R)
+
+
+def _tracked(images: IterableSequence, vocabulary: Path | None, seconds: float) -> list[Trajectory]:
+    """Paths of the camera in the first part of the recording, one per map."""
+    last = float(images.timestamps[0]) + seconds
+
+    system = System(
+        images.settings, images.sensor, vocabulary, deterministic=True, loop_closing=False
+    )
+    with system:
+        system.run(itertools.takewhile(lambda frame: frame.timestamp <= last, images))
+    return [path for path in system.trajectories() if len(path)]
+
+
+def _print(
+    report: ImuReport, believed: ImuSettings | None, plot: Path | None, *, quiet: bool
+) -> None:
+    console = Console(highlight=False, soft_wrap=True, markup=True)
+    if not quiet:
+        for note in report.notes:
+            console.print(escape(note))
+        if believed is None:
+            console.print("no IMU settings are known (--imu-settings): only the best fit is shown")
+        for question in report.open_questions:
+            console.print(f"[yellow]Not checked:[/] {escape(question)}")
+        if plot is not None:
+            console.print(f"Look at [bold]{escape(str(plot))}[/]")
+    for fault in report.faults:
+        console.print(f"[bold red]Fault ({fault.kind}):[/] {escape(fault.text)}")
+    if report.fits:
+        checked = "" if not report.open_questions else ", as far as it could be checked"
+        console.print(f"[bold green]The IMU fits{checked}.[/]")

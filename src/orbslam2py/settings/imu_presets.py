@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Noise of IMUs by the name of the chip, for those who have not measured theirs.
+
+Noise densities are from the data sheets of the makers, at the usual bandwidth. Data sheets do not
+give random walks of the bias; these are cautious figures for the class of the chip, of the size
+that Allan plots of such chips show. Measured figures are better than presets.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from orbslam2py.errors import SettingsError
+
+_DEGREE = math.pi / 180
+_MICRO_G = 9.80665e-6
+
+#: Walks of the bias of consumer chips and of industrial modules: gyro [rad/s^2/sqrt(Hz)],
+#: accelerometer [m/s^3/sqrt(Hz)].
+_CONSUMER = (2e-5, 1e-3)
+_INDUSTRIAL = (5e-6, 3e-4)
+
+
+@dataclass(frozen=True)
+class ImuNoise:
+    """Noise of an IMU.
+
+    Attributes
+    ----------
+    gyro_noise
+        Noise density of the gyro, rad/s/sqrt(Hz).
+    accel_noise
+        Noise density of the accelerometer, m/s^2/sqrt(Hz).
+    gyro_walk
+        Random walk of the bias of the gyro, rad/s^2/sqrt(Hz).
+    accel_walk
+        Random walk of the bias of the accelerometer, m/s^3/sqrt(Hz).
+    source
+        Where the densities are from.
+    """
+
+    gyro_noise: float
+    accel_noise: float
+    gyro_walk: float
+    accel_walk: float
+    source: str
+
+
+def _chip(gyro: float, accel: float, walks: tuple[float, float], source: str) -> ImuNoise:
+    """Of a data sheet: degrees/s/sqrt(Hz) and micro-g/sqrt(Hz)."""
+    return ImuNoise(gyro * _DEGREE, accel * _MICRO_G, *walks, f"data sheet: {source}")
+
+
+#: By the name of the chip in lower case.
+IMU_NOISE = {
+    "mpu6050": _chip(0.005, 400, _CONSUMER, "InvenSense MPU-6000/6050"),
+    "mpu9250": _chip(0.01, 300, _CONSUMER, "InvenSense MPU-9250"),
+    "icm20602": _chip(0.004, 100, _CONSUMER, "TDK InvenSense ICM-20602"),
+    "icm20948": _chip(0.015, 230, _CONSUMER, "TDK InvenSense ICM-20948"),
+    "icm42688": _chip(0.0028, 70, _CONSUMER, "TDK InvenSense ICM-42688-P"),
+    "bmi055": _chip(0.014, 150, _CONSUMER, "Bosch BMI055"),
+    "bmi085": _chip(0.014, 135, _CONSUMER, "Bosch BMI085"),
+    "bmi088": _chip(0.014, 175, _CONSUMER, "Bosch BMI088"),
+    "bmi160": _chip(0.007, 180, _CONSUMER, "Bosch BMI160"),
+    "bmi270": _chip(0.007, 160, _CONSUMER, "Bosch BMI270"),
+    "lsm6ds3": _chip(0.007, 90, _CONSUMER, "ST LSM6DS3"),
+    "lsm6dsl": _chip(0.004, 90, _CONSUMER, "ST LSM6DSL"),
+    "lsm6dso": _chip(0.0038, 70, _CONSUMER, "ST LSM6DSO"),
+    "adis16448": _chip(0.0135, 230, _INDUSTRIAL, "Analog Devices ADIS16448"),
+    "adis16470": _chip(0.008, 100, _INDUSTRIAL, "Analog Devices ADIS16470"),
+}
+
+
+def imu_noise(chip: str) -> ImuNoise:
+    """Return the noise of a chip.
+
+    Parameters
+    ----------
+    chip
+        Its name, such as ``bmi088``; case, blanks and hyphens do not matter.
+
+    Raises
+    ------
+    SettingsError
+        If it is not known, with all names there are.
+    """
+    plain = str(chip).lower().replace("-", "").replace("_", "").replace(" ", "")
+    if plain not in IMU_NOISE:
+        raise SettingsError(
+            f"no noise is known of the IMU '{chip}'; there are {', '.join(sorted(IMU_NOISE))}: "
+            "take the most similar one, or give the figures in a file"
+        )
+    return IMU_NOISE[plain]
