@@ -44,7 +44,8 @@ def project_points(
     rows, points
         Rows of keyframes and of points, (s,) each.
     bent
-        Through the lens, with OpenCV's distortion, or as a pinhole camera; bool (s,).
+        Through the lens, with OpenCV's distortion, or as a pinhole camera; bool (s,). A fisheye
+        camera has but one image.
 
     Returns
     -------
@@ -61,7 +62,12 @@ def project_points(
     radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
     u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack(
+    pixels = np.stack(
         [cameras.fx[camera] * u + cameras.cx[camera], cameras.fy[camera] * v + cameras.cy[camera]],
         axis=1,
     )
+    for number in np.unique(camera):
+        model = cameras.camera_model(int(number))
+        if model is not None:
+            pixels[camera == number] = model.project(X[camera == number])
+    return pixels

@@ -19,7 +19,7 @@ import numpy as np
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.maps.content_groups import Cameras
 from orbslam2py.maps.contents import MapContents
-from orbslam2py.maps.exports.images import View, pixel_scale
+from orbslam2py.maps.exports.images import View, fisheye_of, pixel_scale
 from orbslam2py.maps.reprojection import project_points
 
 #: Numbers of the camera models and of the parameters each has.
@@ -157,7 +157,11 @@ def _camera(
         sy * (cameras.cy[row] + 0.5),
     ]
     lens = cameras.distortion[row].tolist()
-    if view.undistorted:
+    fisheye = cameras.camera_model(row)
+    if fisheye is not None:
+        model, own = fisheye_of(fisheye, "COLMAP's model", {"fov": "FOV"})
+        parameters = [sx * own[0], sy * own[1], *pinhole[2:], *own[4:]]
+    elif view.undistorted:
         model, parameters = "PINHOLE", pinhole
     elif any(lens[4:]):
         model, parameters = "FULL_OPENCV", [*pinhole, *lens]

@@ -68,9 +68,9 @@ def write_images(
 ) -> tuple[list[View], MapContents]:
     """Write the keyframes' images as PNG files, as a pinhole camera would see them.
 
-    The camera keeps its matrix; what a lens bends out of the image is cut off, and where it bends
-    in nothing, the image is black. Images of another size than the camera's (small copies) are
-    taken for scaled ones.
+    Those of fisheye cameras stay as they are. Of others the camera keeps its matrix; what a lens
+    bends out of the image is cut off, and where it bends in nothing, the image is black. Images of
+    another size than the camera's (small copies) are taken for scaled ones.
 
     Parameters
     ----------
@@ -110,7 +110,8 @@ def write_images(
             straight = _undistorted(contents, row, image)
             _write_png(folder / image_name(number), straight)
             height, width = image.shape[:2]
-            views.append(View(row, image_name(number), width, height, undistorted=True))
+            fisheye = contents.cameras.model[contents.keyframes.camera[row]] != 0
+            views.append(View(row, image_name(number), width, height, undistorted=not fisheye))
         if progress is not None:
             progress(row + 1, len(ids))
     if not views:

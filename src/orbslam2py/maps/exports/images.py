@@ -14,7 +14,7 @@ from orbslam2py._arguments import instance_of, path_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import DatasetError, ImageError, MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
-from orbslam2py.settings import Settings
+from orbslam2py.settings import CameraModel, Settings
 from orbslam2py.trajectory import associate
 
 #: Gives the image of a keyframe by its id, uint8 (h, w) grey or (h, w, 3) RGB; None: there is none.
@@ -172,6 +172,35 @@ class View:
     """The image shows what a pinhole camera sees; otherwise the lens distorts it."""
 
 
+def fisheye_of(
+    model: CameraModel, format_name: str, others: Mapping[str, str]
+) -> tuple[str, tuple[float, ...]]:
+    """Return the name of a fisheye model in a format, and its parameters.
+
+    Parameters
+    ----------
+    model
+        The camera.
+    format_name
+        For the message.
+    others
+        Names in the format of models beside Kannala-Brandt, by our names.
+
+    Raises
+    ------
+    DatasetError
+        If the format cannot hold the model.
+    """
+    names = {"kannala_brandt": "OPENCV_FISHEYE", **others}
+    if model.name not in names:
+        raise DatasetError(
+            f"{format_name} cannot hold a lens of the model {model.name}, only "
+            f"{', '.join(names)}; make the map with settings of such a model (Kalibr calibrates "
+            "one as pinhole-equi), or export points and trajectory (ply, pcd, tum)"
+        )
+    return names[model.name], model.parameters
+
+
 def views_without_images(
     contents: MapContents, names: Mapping[int, str | Path] | None
 ) -> list[View]:
@@ -193,7 +222,7 @@ def views_without_images(
         remedy = "a dict from keyframe ids to names of files"
         instance_of(names, Mapping, "image_names", remedy, MapFileError)  # type: ignore[type-abstract]
     keyframes, cameras = contents.keyframes, contents.cameras
-    distorts = np.any(cameras.distortion != 0, axis=1)
+    distorts = np.any(cameras.distortion != 0, axis=1) | (cameras.model != 0)
     return [
         View(
             row,

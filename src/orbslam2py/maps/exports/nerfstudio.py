@@ -20,6 +20,7 @@ from orbslam2py.maps.exports.images import (
     ImageOfKeyframe,
     Progress,
     View,
+    fisheye_of,
     pixel_scale,
     views_without_images,
 )
@@ -131,10 +132,23 @@ def camera_to_world(T_wc: FloatArray) -> FloatArray:
     return np.asarray(_UP @ T_wc @ _OPENGL)
 
 
-def _camera(contents: MapContents, view: View) -> dict[str, float]:
+def _camera(contents: MapContents, view: View) -> dict[str, float | str]:
     cameras: Cameras = contents.cameras
     row = int(contents.keyframes.camera[view.row])
     sx, sy = pixel_scale(contents, view)
+    fisheye = cameras.camera_model(row)
+    if fisheye is not None:
+        name, own = fisheye_of(fisheye, "nerfstudio's transforms.json", {})
+        return {
+            "camera_model": name,
+            "w": view.width,
+            "h": view.height,
+            "fl_x": sx * own[0],
+            "fl_y": sy * own[1],
+            "cx": sx * (own[2] + 0.5),
+            "cy": sy * (own[3] + 0.5),
+            **dict(zip(("k1", "k2", "k3", "k4"), own[4:], strict=True)),
+        }
     lens = np.zeros(8) if view.undistorted else cameras.distortion[row]
     k1, k2, p1, p2, k3, *rational = lens.tolist()
     if any(rational):

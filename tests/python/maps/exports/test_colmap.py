@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,9 +14,10 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from orbslam2py import DatasetError, MapFileError
+from orbslam2py import CameraModel, DatasetError, MapFileError
 from orbslam2py._arrays import ByteArray
 from orbslam2py.maps import MapContents, export_colmap
+from orbslam2py.maps.content_groups import LENS_SIZE, model_number_of
 from support.made_up_map import (
     BF,
     CX,
@@ -278,3 +280,36 @@ def test_no_images_at_all(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no keyframe has an image; give the sequence"):
         export_colmap(made_up_map(3), tmp_path / "out", images=lambda _: None)
     assert not list(tmp_path.iterdir())
+
+
+# ---- fisheye lenses ------------------------------------------------------------------------------
+KANNALA_BRANDT = (-0.02, 0.005, -0.003, 0.001)
+
+
+def fisheye_map(model: str, lens: tuple[float, ...]) -> MapContents:
+    contents = made_up_map()
+    numbers = np.zeros((1, LENS_SIZE))
+    numbers[0, : 4 + len(lens)] = (FX, FY, CX, CY, *lens)
+    model_number = np.array([model_number_of(model)])
+    return replace(contents, cameras=replace(contents.cameras, model=model_number, lens=numbers))
+
+
+def test_a_fisheye_camera_keeps_its_model(tmp_path: Path) -> None:
+    contents = fisheye_map("kannala_brandt", KANNALA_BRANDT)
+    export_colmap(contents, tmp_path / "colmap")
+    camera = read(tmp_path / "colmap").cameras[1]
+    assert camera.model.name == "OPENCV_FISHEYE"
+    np.testing.assert_allclose(camera.params, (FX, FY, CX + 0.5, CY + 0.5, *KANNALA_BRANDT))
+    # COLMAP projects as we do.
+    point = np.array([0.4, -0.3, 1.1])
+    ours = CameraModel(
+        "kannala_brandt", (FX, FY, CX, CY, *KANNALA_BRANDT), (WIDTH, HEIGHT)
+    ).project([point])
+    np.testing.assert_allclose(camera.img_from_cam(point), ours[0] + 0.5, atol=1e-6)
+
+
+def test_a_lens_that_colmap_does_not_know(tmp_path: Path) -> None:
+    contents = fisheye_map("double_sphere", (-0.2, 0.6))
+    with pytest.raises(DatasetError, match=r"double_sphere.*kannala_brandt"):
+        export_colmap(contents, tmp_path / "colmap")
+    assert not (tmp_path / "colmap").exists()
