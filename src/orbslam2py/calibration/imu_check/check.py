@@ -200,7 +200,7 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
         report.blame(
             "g",
             f"the accelerometer reads {length:.3g} where gravity is 9.81 m/s^2: it is in g; "
-            "multiply by 9.81, or give --accel-unit g",
+            "multiply by 9.81, or give the table with --imu and --accel-unit g",
         )
         return gyro, accel * streams.GRAVITY
     low, high = _ODD_FORCE
@@ -266,7 +266,8 @@ def _check_scale(report: ImuReport, rates: RateFit) -> None:
         report.blame(
             "degrees",
             f"the gyro reads {1 / factor:.1f} times the camera's rotation rate: it is in degrees "
-            "per second; multiply by 0.0174533, or give --gyro-unit deg/s",
+            "per second; multiply by 0.0174533, or give the table with --imu and "
+            "--gyro-unit deg/s",
         )
     elif abs(factor - 1) > _SMALL_SCALE:
         report.blame(
