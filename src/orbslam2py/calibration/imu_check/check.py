@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from orbslam2py.calibration.imu_check.rates import (
     fit_rates,
     signed_permutations,
 )
+from orbslam2py.calibration.imu_check.report import ImuReport
 from orbslam2py.datasets import ImuSamples
 from orbslam2py.settings import ImuSettings
 from orbslam2py.trajectory import Trajectory
@@ -42,57 +42,6 @@ _SMALL_MISFIT = 5e-3
 #: Norm of the difference of two rotations that are 16 degrees apart.
 _SAME_AXES = 0.4
 _READINGS = ("gyro", "accelerometer")
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One fault of an IMU, or of its settings.
-
-    Attributes
-    ----------
-    kind
-        A short name: ``time_offset``, ``axes``, ``inverse``, ``rotation``, ``degrees``, ``g``,
-        ``scale``, ``swapped``, ``dead``, ``saturated``, ``sign`` or ``unrelated``.
-    text
-        What is wrong and the likely remedy.
-    """
-
-    kind: str
-    text: str
-
-
-@dataclass
-class ImuReport:
-    """What `check_imu` found.
-
-    Attributes
-    ----------
-    faults
-        All faults; none if the IMU fits.
-    notes
-        What was measured, one sentence each.
-    open_questions
-        What could not be checked, and why.
-    rates
-        The gyro beside the camera; None if it could not be compared.
-    gravity
-        The accelerometer beside the path; None if it could not be compared.
-    """
-
-    faults: list[Finding] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    open_questions: list[str] = field(default_factory=list)
-    rates: RateFit | None = None
-    gravity: GravityFit | None = None
-
-    @property
-    def fits(self) -> bool:
-        """Whether no fault was found."""
-        return not self.faults
-
-    def blame(self, kind: str, text: str) -> None:
-        """Add a fault."""
-        self.faults.append(Finding(kind, text))
 
 
 def check_imu(
