@@ -145,7 +145,7 @@ SUBCOMMANDS = {
     "check-imu": Subcommand(
         "check_imu",
         "check",
-        "Compare the IMU of a recording with its camera: axes, signs, units, clock, gravity.",
+        "Track the images and compare the IMU with the camera: axes, signs, units, clock, gravity.",
     ),
     "config": Subcommand(
         "config", "show", "List the thresholds of the method, their defaults and what they mean."

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from orbslam2py.calibration.imu_check.rates import (
     fit_rates,
     signed_permutations,
 )
+from orbslam2py.calibration.imu_check.report import ImuReport
 from orbslam2py.datasets import ImuSamples
 from orbslam2py.settings import ImuSettings
 from orbslam2py.trajectory import Trajectory
@@ -42,57 +42,6 @@ _SMALL_MISFIT = 5e-3
 #: Norm of the difference of two rotations that are 16 degrees apart.
 _SAME_AXES = 0.4
 _READINGS = ("gyro", "accelerometer")
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One fault of an IMU, or of its settings.
-
-    Attributes
-    ----------
-    kind
-        A short name: ``time_offset``, ``axes``, ``inverse``, ``rotation``, ``degrees``, ``g``,
-        ``scale``, ``swapped``, ``dead``, ``saturated``, ``sign`` or ``unrelated``.
-    text
-        What is wrong and the likely remedy.
-    """
-
-    kind: str
-    text: str
-
-
-@dataclass
-class ImuReport:
-    """What `check_imu` found.
-
-    Attributes
-    ----------
-    faults
-        All faults; none if the IMU fits.
-    notes
-        What was measured, one sentence each.
-    open_questions
-        What could not be checked, and why.
-    rates
-        The gyro beside the camera; None if it could not be compared.
-    gravity
-        The accelerometer beside the path; None if it could not be compared.
-    """
-
-    faults: list[Finding] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    open_questions: list[str] = field(default_factory=list)
-    rates: RateFit | None = None
-    gravity: GravityFit | None = None
-
-    @property
-    def fits(self) -> bool:
-        """Whether no fault was found."""
-        return not self.faults
-
-    def blame(self, kind: str, text: str) -> None:
-        """Add a fault."""
-        self.faults.append(Finding(kind, text))
 
 
 def check_imu(
@@ -200,7 +149,7 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
         report.blame(
             "g",
             f"the accelerometer reads {length:.3g} where gravity is 9.81 m/s^2: it is in g; "
-            "multiply by 9.81, or give --accel-unit g",
+            "multiply by 9.81, or give the table with --imu and --accel-unit g",
         )
         return gyro, accel * streams.GRAVITY
     low, high = _ODD_FORCE
@@ -266,7 +215,8 @@ def _check_scale(report: ImuReport, rates: RateFit) -> None:
         report.blame(
             "degrees",
             f"the gyro reads {1 / factor:.1f} times the camera's rotation rate: it is in degrees "
-            "per second; multiply by 0.0174533, or give --gyro-unit deg/s",
+            "per second; multiply by 0.0174533, or give the table with --imu and "
+            "--gyro-unit deg/s",
         )
     elif abs(factor - 1) > _SMALL_SCALE:
         report.blame(

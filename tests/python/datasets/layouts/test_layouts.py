@@ -275,3 +275,16 @@ def test_lists_of_images_like_nclt(tmp_path: Path, digits: int) -> None:
     assert texts == [f"{name[:10]}.{name[10:]}" for name in names]
     counted = open_input(tmp_path / "Cam5", settings="tum1", fps=10)
     assert counted.timestamps.tolist() == [0, 0.1, 0.2, 0.3]  # type: ignore[union-attr]
+
+
+def test_the_imu_of_openloris(tmp_path: Path) -> None:
+    openloris(tmp_path)
+    assert open_sequence(tmp_path).imu() is None
+    gyro = [f"{0.005 * k:.3f} 0.1 0.2 {0.005 * k:.3f}" for k in range(9)]
+    accel = [f"{0.01 * k:.3f} {k} 0 9.8" for k in range(5)]
+    for name, lines in (("gyroscope", gyro), ("accelerometer", accel)):
+        text = "\n".join(["#Time x y z", *lines]) + "\n"
+        (tmp_path / f"d400_{name}.txt").write_text(text)
+    samples = open_sequence(tmp_path).imu()
+    assert len(samples) == 9
+    assert samples.data[3].tolist() == pytest.approx([0.015, 0.1, 0.2, 0.015, 1.5, 0, 9.8])
