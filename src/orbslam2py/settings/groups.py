@@ -138,6 +138,14 @@ class CameraSettings:
         return CameraModel(_OPENCV_MODELS[len(lens)], (*intrinsics, *lens), (width, height))
 
     @property
+    def pixels_per_radian(self) -> float:
+        """Pixels that the image moves in its middle per radian that the camera turns."""
+        if not self.is_fisheye:
+            return self.fx
+        model = self.camera_model(self.width or 1, self.height or 1)
+        return float(model.pixels_per_radian([[self.cx, self.cy]])[0])
+
+    @property
     def matrix(self) -> FloatArray:
         """The camera matrix K, float64 (3, 3), pixels."""
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])

@@ -386,7 +386,9 @@ def _make_tracking(
 
     def acceptance_of(searching: PoseSearch) -> PoseAcceptance:
         judge = PoseValidator(
-            searching.motion_model_window, setup.settings.camera.fx, config.acceptance
+            searching.motion_model_window,
+            setup.settings.camera.pixels_per_radian,
+            config.acceptance,
         )
         return PoseAcceptance(searching, judge, MultiHypothesisSearch(searching, judge))
 

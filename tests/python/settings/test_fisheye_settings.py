@@ -281,3 +281,19 @@ def test_the_self_calibration_leaves_fisheyes_out() -> None:
     points = np.random.default_rng(2).uniform(0, 512, (100, 2))
     assert calibration_gains(TUMVI, [PointPair(points, points + 5)]) is None
     assert calibration_gains(replace(TUMVI, model="pinhole", lens=()), [PointPair(points, points)])
+
+
+def test_pixels_per_radian_are_those_of_the_middle() -> None:
+    # Of a double sphere the radius is fx r / ((1 + xi) z) near the axis.
+    camera = CameraSettings(
+        fx=158,
+        fy=158,
+        cx=320,
+        cy=320,
+        width=640,
+        height=640,
+        model="double_sphere",
+        lens=(-0.2, 0.6),
+    )
+    assert camera.pixels_per_radian == pytest.approx(158 / 0.8)
+    assert CameraSettings(fx=200, fy=210, cx=1, cy=1).pixels_per_radian == 200
