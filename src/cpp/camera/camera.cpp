@@ -46,12 +46,14 @@ void check(const CameraOptions& options) {
   }
 }
 
-/// A calibration may describe the corners badly, but not the middles of the borders.
-void check_borders(const Camera& camera) {
-  const double right = camera.image_size().width - 1, bottom = camera.image_size().height - 1;
-  const Eigen::Vector2d middles[] = {
-      {0, bottom / 2}, {right, bottom / 2}, {right / 2, 0}, {right / 2, bottom}};
-  for (const Eigen::Vector2d& middle : middles) {
+/// A calibration may describe the borders badly, but not what is halfway to them.
+void check_inside(const Camera& camera) {
+  const double width = camera.image_size().width, height = camera.image_size().height;
+  const Eigen::Vector2d halfway[] = {{width / 4, height / 2},
+                                     {3 * width / 4, height / 2},
+                                     {width / 2, height / 4},
+                                     {width / 2, 3 * height / 4}};
+  for (const Eigen::Vector2d& middle : halfway) {
     if (camera.shows(middle)) continue;
     throw SettingsError(
         "the distortion coefficients fold the image over: no direction belongs to pixel (" +
@@ -64,7 +66,7 @@ ImageBounds bounds_of(const Camera& camera) {
   const auto width = static_cast<float>(camera.image_size().width);
   const auto height = static_cast<float>(camera.image_size().height);
   if (!camera.distorts()) return {0, width, 0, height};
-  check_borders(camera);
+  check_inside(camera);
 
   const Eigen::Vector2f upper_left = camera.from_image({0, 0});
   const Eigen::Vector2f upper_right = camera.from_image({width, 0});

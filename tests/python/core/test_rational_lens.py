@@ -44,10 +44,10 @@ def test_undistortion_is_that_of_opencv(n: int) -> None:
     np.testing.assert_allclose(camera.rays(straight), rays, rtol=1e-12)
     np.testing.assert_allclose(camera.project(2.5 * rays), straight, atol=1e-9)
     again = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), K, lens)[0][:, 0]
-    np.testing.assert_allclose(camera.to_image(straight), again, atol=1e-9)
-    middle = np.abs(raw - K[:2, 2]).max(axis=1) < 250  # five steps are few for the corners
-    wanted, found = (raw, again) if n == 8 else (raw[middle], again[middle])
-    np.testing.assert_allclose(found, wanted, atol=1e-4 if n == 8 else 0.2)
+    # A cut rational lens folds over outside of this.
+    shown = np.full(len(raw), True) if n == 8 else np.abs(raw - K[:2, 2]).max(axis=1) < 250
+    np.testing.assert_allclose(camera.to_image(straight)[shown], again[shown], atol=1e-9)
+    np.testing.assert_allclose(again[shown], raw[shown], atol=1e-4)
 
 
 def test_points_that_are_not_in_front_have_no_pixel() -> None:

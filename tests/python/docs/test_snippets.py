@@ -190,6 +190,8 @@ def test_examples_of_the_commands_run(
                 continue  # needs a camera
             if "--viewer" in line or line.startswith("orbslam2py view "):
                 continue  # stays until Ctrl-C; tests/python/viewer drives it
+            if line.startswith("orbslam2py check-imu "):
+                continue  # tests/python/cli/test_check_imu.py, on recordings that have an IMU
             if line.startswith("orbslam2py map "):
                 continue  # tests/python/cli/test_map_files.py, on maps that are long enough
             more = "" if line.split()[1] == "demo" else SHORTER.get(line.split()[1], "")

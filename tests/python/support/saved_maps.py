@@ -36,7 +36,8 @@ def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
 def written_as_version(version: int, folder: Path) -> Path:
     """The small map as an earlier version of the format had it.
 
-    Version 2 had no rational lenses; version 1 no words, and a short hash of the vocabulary.
+    Version 3 had no fisheye lenses, version 2 no rational ones; version 1 had no words, and a short
+    hash of the vocabulary.
     """
     path = folder / f"version_{version}.orbmap"
     sums: dict[str, list[int]] = {name: [] for name in TABLES}
@@ -45,7 +46,7 @@ def written_as_version(version: int, folder: Path) -> Path:
         for name, present in all_rows(small_map()):
             row = present[:-1] if name == "keypoints" and version < 2 else present
             if name == "cameras":
-                row = (*present[:10], *present[13:])
+                row = present[:-2] if version == 3 else (*present[:10], *present[13:-2])
             if name == "vocabulary" and version < 2:
                 row = (1, "", f"{load_vocabulary().hash:016x}", "")
             sums[name].append(checksum(row))

@@ -51,7 +51,8 @@ def export_colmap(
         Where the keyframes' images come from (`images_of`): they are written without the lens'
         distortion, for cameras of the model ``PINHOLE``; keyframes without one are left out.
         Without `images` none are written, and the cameras are those that took them: ``PINHOLE``,
-        ``OPENCV`` (k1, k2, p1, p2) or ``FULL_OPENCV`` (k3 as well).
+        ``OPENCV`` (k1, k2, p1, p2) or ``FULL_OPENCV`` (k3 as well). Fisheye cameras are
+        ``OPENCV_FISHEYE`` (Kannala-Brandt) or ``FOV`` in either case.
     image_names
         Names for images that are elsewhere, by keyframe id, where `images` is not given; keyframes
         without one are left out. By default ``keyframe_000012.png`` and so on. Names with spaces

@@ -23,7 +23,7 @@ from orbslam2py.maps.exports.images import View, fisheye_of, pixel_scale
 from orbslam2py.maps.reprojection import project_points
 
 #: Numbers of the camera models and of the parameters each has.
-MODEL_IDS = {"PINHOLE": 1, "OPENCV": 4, "FULL_OPENCV": 6}
+MODEL_IDS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6, "FOV": 7}
 
 #: Of points without a colour.
 _GREY = 128
@@ -131,7 +131,7 @@ def _sightings(contents: MapContents, views: list[View]) -> tuple[IntArray, Floa
     for view in views:
         shown[view.row], bent[view.row] = True, not view.undistorted
         scales[view.row] = pixel_scale(contents, view)
-        if not view.undistorted:
+        if bent[view.row] and not contents.cameras.model[keyframes.camera[view.row]]:
             part = keyframes.keypoints_of(view.row)
             xy[part] = keyframes.raw_keypoints[part]
     row_of_keypoint = np.repeat(np.arange(len(keyframes)), np.diff(keyframes.offsets))
