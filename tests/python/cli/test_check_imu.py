@@ -114,4 +114,4 @@ def test_euroc(command, shared_data, name):
     if name.endswith("flight90"):
         angle = re.search(r"([0-9.]+) degrees from the settings", done.out)
         assert angle is not None
-        assert float(angle[1]) < 0.5
+        assert float(angle[1]) < 1.0
