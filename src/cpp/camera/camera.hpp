@@ -92,7 +92,7 @@ class Camera {
     error = raw_error(uv - Eigen::Vector2d(u, v), u, v);
     return true;
   }
-  /// In raw pixels a small difference of the plane against a keypoint at (u, v).
+  /// Converts a small pixel difference at (u, v) from the plane to raw pixels.
   Eigen::Vector2d raw_error(const Eigen::Vector2d& difference, double u, double v) const {
     return distorts_ ? Eigen::Vector2d(raw_by_plane(u, v) * difference) : difference;
   }
@@ -111,9 +111,9 @@ class Camera {
   /// Pixel of the plane of a raw one. A raw pixel at which the lens can show nothing, because its
   /// model folds over there, stays as it is.
   Eigen::Vector2f from_image(const Eigen::Vector2f& raw) const;
-  /// Some direction belongs to a raw pixel.
+  /// The lens model assigns a direction to this raw pixel.
   bool shows(const Eigen::Vector2d& raw) const;
-  /// Raw pixel of one of the plane; NaN where the lens shows nothing.
+  /// The raw pixel of a pixel of the plane; NaN where the lens shows nothing.
   Eigen::Vector2d to_image(const Eigen::Vector2d& uv) const;
 
   bool has_baseline() const { return options_.bf > 0; }

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Noise of IMUs by the name of the chip, for those who have not measured theirs.
 
-Noise densities are from the data sheets of the makers, at the usual bandwidth. Data sheets do not
-give random walks of the bias; these are cautious figures for the class of the chip, of the size
-that Allan plots of such chips show. Measured figures are better than presets.
+Noise densities are the typical values that the makers state. They were not compared with the
+current data sheets: check yours. Makers do not state random walks of the bias. The values here are
+guesses for the class of the chip. A calibration of your IMU is better than a preset.
 """
 
 from __future__ import annotations
@@ -48,8 +48,13 @@ class ImuNoise:
 
 
 def _chip(gyro: float, accel: float, walks: tuple[float, float], source: str) -> ImuNoise:
-    """Of a data sheet: degrees/s/sqrt(Hz) and micro-g/sqrt(Hz)."""
-    return ImuNoise(gyro * _DEGREE, accel * _MICRO_G, *walks, f"data sheet: {source}")
+    """Convert the units of data sheets: degrees/s/sqrt(Hz) and micro-g/sqrt(Hz)."""
+    return ImuNoise(
+        gyro * _DEGREE,
+        accel * _MICRO_G,
+        *walks,
+        f"typical value of the maker, not checked: {source}",
+    )
 
 
 #: By the name of the chip in lower case.

@@ -390,7 +390,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
 
     @cached_property
     def _wide_view(self) -> WideView | None:
-        """What puts an image together that is seen through a lens."""
+        """Renderer of images through a lens; None without a lens."""
         seen_through = self.options.lens
         return None if seen_through is None else WideView(seen_through.camera_model(*self._size))
 

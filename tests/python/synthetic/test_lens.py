@@ -14,17 +14,8 @@ from orbslam2py.cli.app import app
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.lenses import DISTORTED, FISHEYE, VERY_WIDE
 
-FISHEYE = CameraSettings(
-    fx=120,
-    fy=121,
-    cx=158,
-    cy=122,
-    width=320,
-    height=240,
-    model="kannala_brandt",
-    lens=(-0.01, 0.02, -0.01, 0.002),
-)
 PINHOLE = CameraSettings(fx=200, fy=200, cx=159.5, cy=119.5, width=320, height=240)
 
 
@@ -47,22 +38,7 @@ def test_through_a_pinhole_it_is_the_image_of_the_renderer() -> None:
 
 @pytest.mark.parametrize(
     "lens",
-    [
-        FISHEYE,
-        CameraSettings(
-            fx=200, fy=201, cx=155, cy=122, k1=-0.28, k2=0.07, p1=1e-3, width=320, height=240
-        ),
-        CameraSettings(
-            fx=70,
-            fy=70,
-            cx=120,
-            cy=120,
-            width=240,
-            height=240,
-            model="double_sphere",
-            lens=(-0.2, 0.6),
-        ),
-    ],
+    [FISHEYE, DISTORTED, VERY_WIDE],
     ids=["fisheye", "distorted", "very wide"],
 )
 def test_a_pixel_shows_what_lies_on_its_ray(lens: CameraSettings) -> None:

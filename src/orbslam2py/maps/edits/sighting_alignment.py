@@ -19,8 +19,8 @@ from orbslam2py._arguments import instance_of, is_whole, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import DatasetError, ImageError, MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.exports.images import ImageSequence
 from orbslam2py.maps.map_copies import restore_contents, take_contents
-from orbslam2py.settings import Settings
 from orbslam2py.trajectory import associate
 
 _log = logging.getLogger(__name__)
@@ -42,21 +42,8 @@ class _HasImages(Protocol):
     def right(self) -> ByteArray | None: ...
 
 
-class ImagePairSequence(Protocol):
-    """What `align_sightings` takes: a sequence as from `orbslam2py.open_sequence`, or alike.
-
-    Attributes
-    ----------
-    settings
-        Tell the order of the colours (``camera.rgb``).
-    timestamps
-        Seconds, float64 (n,).
-    """
-
-    @property
-    def settings(self) -> Settings: ...  # noqa: D102
-    @property
-    def timestamps(self) -> FloatArray: ...  # noqa: D102
+class ImagePairSequence(ImageSequence, Protocol):
+    """What `align_sightings` takes: an image sequence that may have right images."""
 
     def load(self, index: int, /) -> _HasImages:
         """Read (and rectify) a frame: its ``image`` and, of a stereo pair, ``right``."""
