@@ -11,7 +11,7 @@ from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import KeyframeConfig
-from orbslam2py.slam.state import SinceKeyframe
+from orbslam2py.slam.state import SinceKeyframe, Velocity
 
 _TURN_FRAMES = 3  # frames that the view is predicted ahead: a keyframe needs as long to be mapped
 _QUEUE = 3  # keyframes that may wait for the mapper, with depth (ORB-SLAM2)
@@ -64,7 +64,7 @@ class KeyframeDecision:
         frame: core.TrackedFrame,
         reference_keyframe: int,
         n_inliers: int,
-        velocity: core.Pose | None,
+        velocity: Velocity | None,
         since: SinceKeyframe,
     ) -> bool:
         """Whether a tracked frame is to become a keyframe now.
@@ -77,8 +77,8 @@ class KeyframeDecision:
             Shares most points with it.
         n_inliers : int
             Of its pose.
-        velocity : Pose or None
-            Motion from the frame before, if known.
+        velocity : Velocity or None
+            At this frame, if known.
         since : SinceKeyframe
             What the frames since the last keyframe have seen, this one among them.
         """
@@ -148,14 +148,13 @@ class KeyframeDecision:
         return tracked < limits.few_close_points and untracked > limits.many_untracked_close_points
 
     def _turns_away(
-        self, frame: core.TrackedFrame, n_inliers: int, velocity: core.Pose | None
+        self, frame: core.TrackedFrame, n_inliers: int, velocity: Velocity | None
     ) -> bool:
         """Whether what is tracked is about to leave the view, and there are points to follow it."""
         T_nw = frame.T_cw
         if velocity is None or T_nw is None:
             return False
-        for _ in range(_TURN_FRAMES):
-            T_nw = velocity @ T_nw
+        T_nw = velocity.over(_TURN_FRAMES * velocity.seconds) @ T_nw
         staying = core.count_staying(frame, T_nw)
         if staying >= self.limits.kept_share * n_inliers:
             return False

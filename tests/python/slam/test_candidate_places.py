@@ -12,7 +12,7 @@ import pytest
 
 from orbslam2py import _core
 from orbslam2py.slam.relocalization import CandidatePlaces, candidates
-from orbslam2py.slam.state import MOTION_FRAMES, LastKnownPose, LostSearch, loss
+from orbslam2py.slam.state import MOTION_FRAMES, LastKnownPose, LostSearch, Velocity, loss
 
 FRAME: Any = SimpleNamespace()
 
@@ -81,9 +81,17 @@ class Places:
         return keyframes
 
 
-def lost_at(keyframe: int, velocity: _core.Pose | None = None) -> LastKnownPose:
-    last: Any = SimpleNamespace(id=10, T_cw=_core.Pose([0, 0, 0, 1], [5.0, 0, 0]))
-    return LastKnownPose(last, velocity, keyframe)
+SPEED = Velocity(_core.Pose([0, 0, 0, 1], [0.5, 0, 0]), 0.1)
+
+
+def frame_at(number: int, x: float = 0.0) -> Any:
+    """A frame of a camera that takes ten images a second."""
+    T_cw = _core.Pose([0, 0, 0, 1], [x, 0, 0])
+    return SimpleNamespace(id=number, timestamp=number / 10, T_cw=T_cw)
+
+
+def lost_at(keyframe: int, velocity: Velocity | None = None) -> LastKnownPose:
+    return LastKnownPose(frame_at(10, 5.0), velocity, keyframe)
 
 
 def test_the_most_similar_come_first(fake: FakeCore) -> None:
@@ -152,22 +160,22 @@ def test_a_place_that_died_names_nothing(fake: FakeCore) -> None:
 
 # ---- guesses -----------------------------------------------------------------------------------
 def test_the_camera_went_on_or_stayed() -> None:
-    place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
-    went_on, stayed = place.guesses(13)
+    place = lost_at(80, velocity=SPEED)
+    went_on, stayed = place.guesses(frame_at(13))
     assert went_on.translation[0] == pytest.approx(5.0 + 3 * 0.5)
     assert stayed.translation[0] == 5.0
 
 
 def test_after_a_while_nobody_knows_where_it_went() -> None:
-    place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
-    assert len(place.guesses(10 + MOTION_FRAMES)) == 2
-    assert len(place.guesses(11 + MOTION_FRAMES)) == 1
+    place = lost_at(80, velocity=SPEED)
+    assert len(place.guesses(frame_at(10 + MOTION_FRAMES))) == 2
+    assert len(place.guesses(frame_at(11 + MOTION_FRAMES))) == 1
 
 
 def test_a_motion_is_stretched_with_the_map(fake: FakeCore) -> None:
-    place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
+    place = lost_at(80, velocity=SPEED)
     slam_map: Any = FakeMap()
     fake.stretched = 2.0
     place = place.following(slam_map)
     assert place.velocity is not None
-    assert place.velocity.translation[0] == 1.0
+    assert place.velocity.step.translation[0] == 1.0

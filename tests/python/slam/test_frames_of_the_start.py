@@ -189,4 +189,4 @@ def test_the_speed_is_known_from_the_first_frame_on(room: SyntheticSequence) -> 
         assert motion.velocity is not None
         # Mapping, which comes after it, moves the map a little.
         T_cl = np.linalg.inv(path.T_wc[-1]) @ path.T_wc[-2]
-        np.testing.assert_allclose(motion.velocity.matrix, T_cl, atol=0.02)
+        np.testing.assert_allclose(motion.velocity.step.matrix, T_cl, atol=0.02)

@@ -91,7 +91,7 @@ def test_the_end_of_odometry_is_no_motion(sensor: Sensor) -> None:
             n_ends += 1
             assert tracking.motion.velocity is not None
             T_ab = np.linalg.inv(world.sequence.T_wc(i)) @ world.sequence.T_wc(i + 1)
-            error = pose_error(tracking.motion.velocity.matrix, T_ab)
+            error = pose_error(tracking.motion.velocity.step.matrix, T_ab)
             # The jump is 8 cm and 1.8 degrees with a stereo pair.
             assert error.translation_m < 0.03
             assert error.rotation_deg < 0.5

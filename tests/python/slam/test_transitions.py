@@ -110,7 +110,7 @@ def test_a_state_is_never_changed() -> None:
 def test_the_velocity_is_that_of_two_frames_in_a_row() -> None:
     velocity = FOLLOWED.motion.velocity
     assert velocity is not None
-    assert velocity.translation[0] == pytest.approx(2.0)
+    assert velocity.step.translation[0] == pytest.approx(2.0)
     assert FOLLOWED.motion.last.id == 3
     gap = after(FOLLOWED, Tracked(frame(5, 6.0), MANY, 0))
     assert gap.motion.velocity is None
@@ -122,14 +122,14 @@ def test_a_loss_ends_it_and_two_frames_begin_it_again() -> None:
     assert FOUND.motion.velocity is None
     velocity = CONFIRMED.motion.velocity
     assert velocity is not None
-    assert velocity.translation[0] == pytest.approx(1.0)
+    assert velocity.step.translation[0] == pytest.approx(1.0)
 
 
 def test_earlier_frames_of_a_map_give_the_first_one() -> None:
     begun = after(NEW, MapBegun(frame(4, 2.0), (frame(2, 0.0), frame(3, 0.5))))
     velocity = begun.motion.velocity
     assert velocity is not None
-    assert velocity.translation[0] == pytest.approx(1.5)
+    assert velocity.step.translation[0] == pytest.approx(1.5)
     assert after(NEW, MapBegun(frame(4, 2.0))).motion.velocity is None
 
 

@@ -174,12 +174,12 @@ def _ratio(value: float, usual: float) -> float:
 
 def _changes(frame: core.TrackedFrame, motion: Motion) -> tuple[float, float]:
     """Degrees and metres by which a frame moved otherwise than the frame before it."""
-    if motion.velocity is None or motion.last_frame is None:
+    if motion.last_frame is None:
         return 0.0, 0.0
-    T_lw, T_cw = motion.last.T_cw, frame.T_cw
-    if T_lw is None or T_cw is None:
+    T_cl, T_lw, T_cw = motion.predicted(frame.timestamp), motion.last.T_cw, frame.T_cw
+    if T_cl is None or T_lw is None or T_cw is None:
         return 0.0, 0.0
-    return difference(T_cw, motion.velocity @ T_lw)
+    return difference(T_cw, T_cl @ T_lw)
 
 
 def difference(T_aw: core.Pose, T_bw: core.Pose) -> tuple[float, float]:

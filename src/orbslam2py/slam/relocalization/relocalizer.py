@@ -112,7 +112,7 @@ class Relocalizer:
         wider = min(1 + _WIDENING * lost.failures, _WIDEST)
         just_lost = frame.id - place.last.id <= MOTION_FRAMES
         enough = limits.enough_near if just_lost else limits.enough
-        for guess in place.guesses(frame.id):
+        for guess in place.guesses(frame):
             nearest = self._nearest(guess, ids, T_wc)
             n_inliers = self._near(frame, guess, nearest, wider, enough)
             if n_inliers > 0:

@@ -15,7 +15,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.state.motion import scaled
+from orbslam2py.slam.state.motion import Velocity
 
 #: Frames after a loss in which the pose predicted by the motion is searched.
 MOTION_FRAMES = 10
@@ -30,15 +30,16 @@ class LastKnownPose:
 
     last: core.TrackedFrame
     """The frame, with its pose."""
-    velocity: core.Pose | None
-    """Its motion from one frame to the next, ``T_cl``; None if it is not known."""
+    velocity: Velocity | None
+    """Its velocity; None if it is not known."""
     reference_keyframe: int
     """The keyframe that shares most points with it."""
 
     def following(self, slam_map: core.Map) -> LastKnownPose:
         """Move the frame and its velocity with the map."""
         _, scale_change = core.follow_map(slam_map, self.last)
-        return replace(self, velocity=scaled(self.velocity, scale_change))
+        velocity = None if self.velocity is None else self.velocity.scaled(scale_change)
+        return replace(self, velocity=velocity)
 
     def keyframes(self, slam_map: core.Map) -> list[int]:
         """List the reference keyframe, its best covisible keyframes, and the last ones inserted.
@@ -53,23 +54,20 @@ class LastKnownPose:
         youngest: IntArray = same_map[: -_LAST_KEYFRAMES - 1 : -1]
         return list(dict.fromkeys([reference, *covisible.tolist(), *youngest.tolist()]))
 
-    def guesses(self, frame_id: int) -> list[core.Pose]:
+    def guesses(self, frame: core.TrackedFrame) -> list[core.Pose]:
         """Predict the pose ``T_cw`` of a later frame: by constant velocity, and at rest.
 
         Parameters
         ----------
-        frame_id : int
+        frame : orbslam2py._core.TrackedFrame
             The later frame; the velocity is used for a few frames.
         """
         T_lw = self.last.T_cw
         assert T_lw is not None
-        steps = frame_id - self.last.id
-        if self.velocity is None or steps > MOTION_FRAMES:
+        if self.velocity is None or frame.id - self.last.id > MOTION_FRAMES:
             return [T_lw]
-        predicted = T_lw
-        for _ in range(steps):
-            predicted = self.velocity @ predicted
-        return [predicted, T_lw]
+        T_cl = self.velocity.over(frame.timestamp - self.last.timestamp)
+        return [T_cl @ T_lw, T_lw]
 
 
 @dataclass(frozen=True, eq=False)

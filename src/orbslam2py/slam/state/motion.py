@@ -6,6 +6,7 @@ Mur-Artal, Montiel and Tardos, 2015, section V-B; ``docs/method/tracking.md``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,8 +15,38 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 
 
+#: Seconds over which a velocity is taken to be constant.
+_LONGEST = 1.0
+#: Relative difference of two intervals that is rounding of the time stamps.
+_SAME_INTERVAL = 1e-6
+
+
 def _no_points() -> core.PointBatch:
     return core.PointBatch()
+
+
+@dataclass(frozen=True, eq=False)
+class Velocity:
+    """A velocity that is constant in the axes of the camera, as the motion over an interval."""
+
+    step: core.Pose
+    """Motion over the interval, ``T_cl``."""
+    seconds: float
+    """The interval; negative where frames are tracked backwards in time."""
+
+    def over(self, seconds: float) -> core.Pose:
+        """Return the motion over another interval; over more than a second, that over a second."""
+        seconds = math.copysign(min(abs(seconds), _LONGEST), seconds)
+        if abs(seconds - self.seconds) <= _SAME_INTERVAL * abs(self.seconds):
+            return self.step
+        return core.Pose.exp(seconds / self.seconds * self.step.log())
+
+    def scaled(self, scale_change: float) -> Velocity:
+        """Return the velocity after a loop has corrected the scale of a single camera's map."""
+        if scale_change == 1.0:
+            return self
+        translation = scale_change * self.step.translation
+        return replace(self, step=core.Pose(self.step.quaternion_xyzw, translation))
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +55,8 @@ class Motion:
 
     last_frame: core.TrackedFrame | None = None
     """The last frame with a pose. It stays while the camera is lost."""
-    velocity: core.Pose | None = None
-    """Motion from one frame to the next, ``T_cl``; None where it is not known."""
+    velocity: Velocity | None = None
+    """Velocity at the last frame; None where it is not known."""
     last_points: core.PointBatch = field(default_factory=_no_points)
     """Copies of the points that the last frame saw, as of the last `following`."""
     is_tracked: bool = False
@@ -40,11 +71,23 @@ class Motion:
         return self.last_frame
 
     # ---- what follows from it --------------------------------------------------------------------
+    def predicted(self, timestamp: float) -> core.Pose | None:
+        """Return the motion ``T_cl`` from the last frame to a time [s]; None without a velocity."""
+        if self.velocity is None:
+            return None
+        return self.velocity.over(timestamp - self.last.timestamp)
+
+    def velocity_at(self, frame: core.TrackedFrame) -> Velocity | None:
+        """Return the velocity between the last frame and a frame; None without a pose of either."""
+        T_cl = self.since_last(frame)
+        return None if T_cl is None else Velocity(T_cl, frame.timestamp - self.last.timestamp)
+
     def predict(self, frame: core.TrackedFrame) -> None:
         """Set the pose of a frame by constant velocity; without one, to that of the last frame."""
         T_lw = self.last.T_cw
         assert T_lw is not None
-        frame.T_cw = T_lw if self.velocity is None else self.velocity @ T_lw
+        T_cl = self.predicted(frame.timestamp)
+        frame.T_cw = T_lw if T_cl is None else T_cl @ T_lw
         frame.share_anchor(self.last)
 
     def predict_turned(self, frame: core.TrackedFrame, quaternion_xyzw: FloatArray) -> None:
@@ -60,7 +103,8 @@ class Motion:
         T_lw = self.last.T_cw
         assert T_lw is not None
         # Position of the new camera in the coordinates of the last one.
-        centre = np.zeros(3) if self.velocity is None else self.velocity.center
+        T_cl = self.predicted(frame.timestamp)
+        centre = np.zeros(3) if T_cl is None else T_cl.center
         rotation = core.Pose(quaternion_xyzw, np.zeros(3))
         frame.T_cw = core.Pose(quaternion_xyzw, -(rotation @ centre)) @ T_lw
         frame.share_anchor(self.last)
@@ -87,7 +131,8 @@ class Motion:
         T_lw = self.last_frame.T_cw
         if T_lw is None:
             return None
-        tangent: FloatArray = (self.velocity @ T_lw @ frame.T_cw.inverse()).log()
+        T_cl = self.velocity.over(frame.timestamp - self.last.timestamp)
+        tangent: FloatArray = (T_cl @ T_lw @ frame.T_cw.inverse()).log()
         return tangent
 
     def map_motion_at(self, frame: core.TrackedFrame) -> FloatArray | None:
@@ -113,7 +158,7 @@ class Motion:
         elif before is not None and last.T_cw is not None:
             step = last.T_cw @ before.inverse()
             moved = step if moved is None else step @ moved
-        velocity = scaled(self.velocity, scale_change)
+        velocity = None if self.velocity is None else self.velocity.scaled(scale_change)
         return replace(self, last_points=points, velocity=velocity, map_motion=moved)
 
     def after(self, frame: core.TrackedFrame) -> Motion:
@@ -121,10 +166,10 @@ class Motion:
         last, velocity = self.last_frame, None
         if last is not None and self.is_tracked:
             follows = frame.id == last.id + 1 and frame.big_change == last.big_change
-            velocity = self.since_last(frame) if follows else None
+            velocity = self.velocity_at(frame) if follows else None
         return self.remembering(frame, velocity)
 
-    def remembering(self, frame: core.TrackedFrame, velocity: core.Pose | None) -> Motion:
+    def remembering(self, frame: core.TrackedFrame, velocity: Velocity | None) -> Motion:
         """Make a tracked frame the last one, with a given velocity."""
         return Motion(frame, velocity, self.last_points, is_tracked=True)
 
@@ -138,10 +183,3 @@ class Motion:
             return replace(self, is_tracked=False)
         self.last.T_cw = T_lw
         return self
-
-
-def scaled(velocity: core.Pose | None, scale_change: float) -> core.Pose | None:
-    """Return a velocity after a loop has corrected the scale of a single camera's map."""
-    if velocity is None or scale_change == 1.0:
-        return velocity
-    return core.Pose(velocity.quaternion_xyzw, scale_change * velocity.translation)
