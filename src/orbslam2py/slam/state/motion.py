@@ -14,7 +14,6 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 
-
 #: Seconds over which a velocity is taken to be constant.
 _LONGEST = 1.0
 #: Relative difference of two intervals that is rounding of the time stamps.
