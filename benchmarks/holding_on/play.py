@@ -87,7 +87,7 @@ def play(case: Case, config: Mapping[str, Any] | None = None) -> Played:
             changes[i] = slam.pipeline.back_end.map.big_change_index
             velocity = slam.pipeline.tracking.motion.velocity
             if velocity is not None:
-                motion[i] = velocity.matrix
+                motion[i] = velocity.step.matrix
     path = np.full((n, 4, 4), np.nan)
     last = system.trajectory()
     path[_indices(scene, last.timestamps)] = last.T_wc
