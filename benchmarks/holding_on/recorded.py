@@ -21,7 +21,7 @@ from benchmarks.holding_on.scene import Floats, Integers
 from orbslam2py.datasets import Images, Sequence, open_sequence
 from orbslam2py.datasets.base import rate_of
 from orbslam2py.settings import CameraSettings, Sensor, Settings
-from orbslam2py.trajectory import associate
+from orbslam2py.trajectory import Trajectory, associate, read_trajectory
 
 _Image = NDArray[Any]
 
@@ -39,11 +39,13 @@ class Recording:
     near
         See `Scene.near`.
     has_truth
-        Whether it comes with the camera's poses.
+        Whether it comes with the camera's poses, or those of the body.
     truth_jumps
         Images before which the truth jumps.
     truth_deviation
         Degrees and metres that its other motions are off by, on each axis.
+    body_truth
+        File with the poses of the body, which is the IMU; where the layout knows no truth.
     """
 
     name: str
@@ -52,6 +54,18 @@ class Recording:
     has_truth: bool = True
     truth_jumps: tuple[int, ...] = ()
     truth_deviation: tuple[float, float] = (0.0, 0.0)
+    body_truth: str | None = None
+
+    def truth(self, sequence: Sequence) -> Trajectory | None:
+        """Poses of the camera; None if they are not known."""
+        if not self.has_truth:
+            return None
+        if self.body_truth is None:
+            return sequence.ground_truth()
+        body, _ = read_trajectory(sequence_folder(self.name) / self.body_truth)
+        imu = sequence.imu_settings()
+        assert imu is not None
+        return dataclasses.replace(body, T_wc=body.T_wc @ np.linalg.inv(imu.T_ci))
 
 
 RECORDINGS = [
@@ -264,7 +278,7 @@ class RecordedScene:
     def truth(self) -> Floats:
         """Poses of the camera that is shown."""
         poses = np.full((len(self), 4, 4), np.nan)
-        known = self._sequence.ground_truth() if self._recording.has_truth else None
+        known = self._recording.truth(self._sequence)
         if known is None:
             return poses
         times = self._sequence.timestamps[self._places]

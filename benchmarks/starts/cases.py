@@ -26,8 +26,8 @@ RECORDINGS = [
     Recording("7scenes_redkitchen_head250", ("mono",), 0.5, True, (122,)),
     Recording("kitti_03_left_head120", ("mono",), 5.0),
     Recording("kitti_06_head51_stereo", ("mono",), 5.0),
-    Recording("euroc_MH_01_first170", ("mono",), 0.5),
-    Recording("euroc_V1_01_flight90", ("mono",), 0.5),
+    Recording("euroc_MH_01_first170", ("mono",), 0.5, body_truth="groundtruth.txt"),
+    Recording("euroc_V1_01_flight90", ("mono",), 0.5, body_truth="groundtruth.txt"),
     Recording("kitti_raw_0926_0001_left", ("mono",), 5.0, has_truth=False),
     Recording("drone_semicircle", ("mono",), 0.5, has_truth=False),
 ]
