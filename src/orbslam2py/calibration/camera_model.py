@@ -12,6 +12,7 @@ from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.settings.camera_model import CameraModel
 from orbslam2py.settings.fisheye import PINHOLE
 from orbslam2py.settings.foreign import filled_line
 from orbslam2py.settings.groups import DISTORTION_FIELDS
@@ -45,6 +46,26 @@ def camera_settings(
         rgb=rgb,
         model=model,
         lens=lens,
+    )
+
+
+def settings_of_model(camera: CameraModel, *, fps: float, rgb: bool = False) -> CameraSettings:
+    """Camera settings of a camera model; `fps` and `rgb` are as in `orbslam2py.CameraSettings`."""
+    fx, fy, cx, cy, *lens = camera.parameters
+    width, height = camera.image_size
+    perspective = camera.name in ("pinhole", "radtan4", "radtan5", "rational")
+    return CameraSettings(
+        fx=fx,
+        fy=fy,
+        cx=cx,
+        cy=cy,
+        **(dict(zip(DISTORTION_FIELDS, lens, strict=False)) if perspective else {}),
+        width=width,
+        height=height,
+        fps=fps,
+        rgb=rgb,
+        model=PINHOLE if perspective else camera.name,
+        lens=() if perspective else tuple(lens),
     )
 
 
