@@ -4,7 +4,7 @@
 Minimises the squared reprojection errors over the intrinsics, the poses of the cameras and the
 poses of the board: Levenberg-Marquardt with the Schur complement of the board's poses (B. Triggs et
 al., "Bundle adjustment: a modern synthesis", 1999). Derivatives by the points come from the camera
-models, those by the intrinsics are central differences.
+models, those by the coefficients of the lens are differences.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class AdjustedScene:
 
 def transformed(T: FloatArray, points: FloatArray) -> FloatArray:
     """Points (n, 3) after a transform (4, 4)."""
-    return points @ T[:3, :3].T + T[:3, 3]
+    return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
 
 def rms_of(residuals: FloatArray) -> float:
@@ -146,19 +146,24 @@ def with_parameters(camera: CameraModel, values: FloatArray) -> CameraModel:
     return CameraModel(camera.name, values.tolist(), camera.image_size)
 
 
-def parameter_jacobian(camera: CameraModel, points: FloatArray) -> FloatArray:
-    """Derivatives (n, 2, p) of the pixels by the parameters; 0 where there is no pixel."""
+def parameter_jacobian(camera: CameraModel, points: FloatArray, pixels: FloatArray) -> FloatArray:
+    """Derivatives (n, 2, p) of the pixels by the parameters; 0 where there is no pixel.
+
+    `pixels` (n, 2) are those of the points (n, 3).
+    """
     parameters = np.array(camera.parameters)
-    columns = []
-    for place in range(len(parameters)):
-        step = np.zeros(len(parameters))
-        step[place] = _STEP * max(1.0, abs(parameters[place]))
-        ahead, back = (
-            CameraModel(camera.name, (parameters + sign * step).tolist(), camera.image_size)
-            for sign in (1, -1)
-        )
-        columns.append((ahead.project(points) - back.project(points)) / (2 * step[place]))
-    return np.nan_to_num(np.stack(columns, axis=2))
+    jacobian = np.zeros((len(points), 2, len(parameters)))
+    # The pixel is (fx m_x + cx, fy m_y + cy) in all models.
+    for axis in (0, 1):
+        jacobian[:, axis, axis] = (pixels[:, axis] - parameters[2 + axis]) / parameters[axis]
+        jacobian[:, axis, 2 + axis] = 1.0
+    for place in range(4, len(parameters)):
+        step = _STEP * max(1.0, abs(parameters[place]))
+        moved = parameters.copy()
+        moved[place] += step
+        ahead = CameraModel(camera.name, moved.tolist(), camera.image_size)
+        jacobian[:, :, place] = (ahead.project(points) - pixels) / step
+    return np.nan_to_num(jacobian)
 
 
 @dataclass(eq=False)
@@ -220,10 +225,12 @@ def adjust(
         Most steps.
     """
     unknown = _free_unknowns(scene, free, poses_alone=poses_alone)
-    residuals = scene.residuals(sightings)
-    cost = float((residuals**2).sum())
+    intrinsics = not poses_alone
+    cost = float((scene.residuals(sightings) ** 2).sum())
     damping = _FIRST_DAMPING
-    normal = _normal_equations(scene, sightings) if np.isfinite(cost) else None
+    normal = None
+    if np.isfinite(cost):
+        normal = _normal_equations(scene, sightings, intrinsics=intrinsics)
     for _ in range(iterations):
         if normal is None or damping > _MOST_DAMPING:
             break
@@ -236,7 +243,7 @@ def adjust(
         if done:
             break
         damping = max(damping / 10, _LEAST_DAMPING)
-        normal = _normal_equations(scene, sightings)
+        normal = _normal_equations(scene, sightings, intrinsics=intrinsics)
     return AdjustedScene(
         scene, rms_of(scene.residuals(sightings)), _covariance(scene, sightings, unknown, cost)
     )
@@ -295,7 +302,9 @@ def _exponential(step: FloatArray) -> FloatArray:
     return T
 
 
-def _normal_equations(scene: BoardScene, sightings: Sequence[Sighting]) -> _Normal:
+def _normal_equations(
+    scene: BoardScene, sightings: Sequence[Sighting], *, intrinsics: bool = True
+) -> _Normal:
     sizes = [len(camera.parameters) for camera in scene.cameras]
     begins = np.cumsum([0, *sizes])
     n = int(begins[-1]) + 6 * (len(sizes) - 1)
@@ -306,20 +315,32 @@ def _normal_equations(scene: BoardScene, sightings: Sequence[Sighting]) -> _Norm
     for camera in range(len(sizes)):
         of_camera = [one for one in sightings if one.camera == camera]
         if of_camera:
-            _add_camera(normal, scene, of_camera, int(begins[camera]), int(begins[-1]))
+            places = int(begins[camera]), int(begins[-1])
+            _add_camera(normal, scene, of_camera, places, intrinsics=intrinsics)
     return normal
 
 
 def _add_camera(
-    normal: _Normal, scene: BoardScene, sightings: list[Sighting], begin: int, poses: int
+    normal: _Normal,
+    scene: BoardScene,
+    sightings: list[Sighting],
+    places: tuple[int, int],
+    *,
+    intrinsics: bool,
 ) -> None:
-    """Add the sightings of one camera, whose intrinsics begin at `begin`."""
+    """Add the sightings of one camera.
+
+    `places` are those of its first intrinsic, and of the first pose of a camera.
+    """
+    begin, poses = places
     number = sightings[0].camera
     camera, T_c0 = scene.cameras[number], scene.T_c0[number]
     in_first = [transformed(scene.T_0b[one.moment], one.points) for one in sightings]
     in_camera = [transformed(T_c0, points) for points in in_first]
     pixels, by_point = camera.project_with_jacobian(np.concatenate(in_camera))
-    by_parameter = parameter_jacobian(camera, np.concatenate(in_camera))
+    by_parameter = np.zeros((len(pixels), 2, len(camera.parameters)))
+    if intrinsics:
+        by_parameter = parameter_jacobian(camera, np.concatenate(in_camera), pixels)
     n = by_parameter.shape[2]
     place, row = poses + 6 * (number - 1), 0
     columns = list(range(begin, begin + n)) + (list(range(place, place + 6)) if number else [])

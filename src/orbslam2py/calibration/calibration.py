@@ -125,7 +125,7 @@ class Calibration:
         return self.camera.image_size
 
     @property
-    def K(self) -> FloatArray:  # noqa: N802 - the name of the field
+    def K(self) -> FloatArray:
         """Focal lengths and principal point as a camera matrix (3, 3), pixels."""
         fx, fy, cx, cy = self.camera.parameters[:4]
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -137,7 +137,7 @@ class Calibration:
         For ``pinhole``, ``radtan4`` and ``radtan5`` always k1, k2, p1, p2, k3, (5,); for other
         models in the order of `orbslam2py.CameraModel`.
         """
-        return _padded(self.camera, np.array(self.camera.parameters))[4:]
+        return padded(self.camera, np.array(self.camera.parameters))[4:]
 
     @property
     def residuals(self) -> FloatArray:
@@ -336,7 +336,7 @@ def calibrate(
     camera = scene.cameras[0]
     return Calibration(
         camera=camera,
-        deviations=_padded(camera, solved.deviations(0)),
+        deviations=padded(camera, solved.deviations(0)),
         rms=solved.rms,
         board=board,
         views=tuple(calibrated),
@@ -403,7 +403,7 @@ def without_bad_views(
     return kept, left_out, adjust(begin, sightings_of(kept, board))
 
 
-def _padded(camera: CameraModel, values: FloatArray) -> FloatArray:
+def padded(camera: CameraModel, values: FloatArray) -> FloatArray:
     """Fill up what models of the radial-tangential lens lack, with zeros."""
     if camera.name not in ("pinhole", "radtan4", "radtan5"):
         return values

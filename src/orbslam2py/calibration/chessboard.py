@@ -145,6 +145,8 @@ class BoardViews:
         Images looked at, and those that could not be read.
     fps
         Frames per second of the video, None for a folder.
+    names
+        Names of all images that could be read, in order.
     """
 
     size: tuple[int, int] = (0, 0)
@@ -152,6 +154,7 @@ class BoardViews:
     n_searched: int = 0
     n_unreadable: int = 0
     fps: float | None = None
+    names: list[str] = field(default_factory=list)
 
 
 def find_board(image: ByteArray, board: Board) -> FloatArray | None:
@@ -225,6 +228,7 @@ def find_views(
             result.n_unreadable += 1
         else:
             _check_size(source, name, (image.shape[1], image.shape[0]), result)
+            result.names.append(name)
             found = board.find(_grey(image))
             if found is not None:
                 ids = None if isinstance(board, Board) else found.ids

@@ -125,8 +125,9 @@ def _fit(
     some, seen = rays[used], pixels[used]
     cost, damping = float(((seen - camera.project(some)) ** 2).sum()), 1e-3
     for _ in range(_ITERATIONS):
-        J = parameter_jacobian(camera, some).reshape(-1, len(camera.parameters))
-        r = (seen - camera.project(some)).ravel()
+        shown = camera.project(some)
+        J = parameter_jacobian(camera, some, shown).reshape(-1, len(camera.parameters))
+        r = (seen - shown).ravel()
         A = J.T @ J
         A += np.diag(damping * np.maximum(np.diag(A), 1e-9))
         try:

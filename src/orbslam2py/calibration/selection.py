@@ -30,7 +30,7 @@ from orbslam2py.settings.camera_model import CameraModel
 
 _FOLDS = 5
 #: Models whose error over all views is more than this times the least are not validated.
-_CONTENDER = 1.3
+_CONTENDER = 1.15
 #: Models whose validated errors differ by less than this part are equally good ...
 _EQUAL = 0.02
 #: ... and up to this angle of corners from the axis those of OpenCV are preferred [degrees].
@@ -126,9 +126,7 @@ def choose(scores: Sequence[FamilyScore]) -> list[FamilyScore]:
         raise DatasetError("the views determine no camera: slant the board, and move it more")
     equal = [score for score in scores if score.validated <= (1 + _EQUAL) * least]
     widest = max(score.angle for score in equal)
-    preferred = (
-        (*PERSPECTIVE, *WIDE) if np.degrees(widest) <= _NARROW else (*WIDE, *PERSPECTIVE)
-    )
+    preferred = (*PERSPECTIVE, *WIDE) if np.degrees(widest) <= _NARROW else (*WIDE, *PERSPECTIVE)
     best = min(equal, key=lambda score: preferred.index(score.family))
     return [replace(score, chosen=score is best) for score in scores]
 
@@ -186,10 +184,7 @@ def largest_angle(scene: BoardScene, sightings: Sequence[Sighting]) -> float:
 
 
 _FLAGS = {
-    "pinhole": cv2.CALIB_ZERO_TANGENT_DIST
-    | cv2.CALIB_FIX_K1
-    | cv2.CALIB_FIX_K2
-    | cv2.CALIB_FIX_K3,
+    "pinhole": cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3,
     "radtan4": cv2.CALIB_FIX_K3,
     "radtan5": 0,
     "rational": cv2.CALIB_RATIONAL_MODEL,
@@ -230,13 +225,11 @@ def _from_rays(
     family: str, sightings: Sequence[Sighting], size: tuple[int, int], start: AdjustedScene
 ) -> AdjustedScene | None:
     """Fit the lens to the rays of another one, then adjust all; None if it cannot show them."""
-    first = start.scene.cameras[0].parameters
+    fx, fy, cx, cy, *_ = start.scene.cameras[0].parameters
     points = [transformed(start.scene.T_0b[one.moment], one.points) for one in sightings]
     pixels = np.concatenate([one.corners for one in sightings])
     try:
-        camera = fit_lens(
-            family, np.concatenate(points), pixels, size, first[:2], first[2:4]
-        ).camera
+        camera = fit_lens(family, np.concatenate(points), pixels, size, (fx, fy), (cx, cy)).camera
     except SettingsError:
         return None
     return adjust(replace(start.scene, cameras=(camera,)), sightings)
