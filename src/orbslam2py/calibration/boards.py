@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from orbslam2py._arguments import finite_number, is_whole, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
@@ -18,8 +19,11 @@ from orbslam2py.errors import SettingsError
 #: Fewest corners of a board in an image.
 LEAST_CORNERS = 8
 _MOST_TAGS = 100
-#: Corners may move by this part of a tag's side when they are refined, and by this many pixels.
-_WINDOW, _LEAST_WINDOW, _MOST_WINDOW = 0.12, 2, 6
+#: Half windows in which corners are refined, one after the other, as parts of the side of a tag:
+#: the next corner is 0.3 sides away. Those of ChArUco are parts of the gap between a corner and
+#: the markers beside it.
+_TAG_WINDOWS, _CHARUCO_WINDOW = (0.2, 0.12), 0.7
+_LEAST_WINDOW, _MOST_WINDOW = 2, 8
 
 
 class BoardCorners(NamedTuple):
@@ -132,10 +136,22 @@ class CharucoBoard:
             if ids is None or len(ids) < max(LEAST_CORNERS, 0 if best is None else len(best.ids)):
                 continue
             pixels = np.asarray(corners, np.float64).reshape(-1, 2)
-            best = BoardCorners(np.asarray(ids, np.int64).ravel(), _refined(image, pixels, pixels))
+            rows = np.asarray(ids, np.int64).ravel()
+            best = BoardCorners(rows, self._refine(image, rows, pixels))
             if len(ids) >= 0.5 * len(self.points):
                 break
         return best if best is not None and _spread_in_plane(self.points[best.ids]) else None
+
+    def _refine(self, image: ByteArray, ids: IntArray, pixels: FloatArray) -> FloatArray:
+        """Refine with a window that does not reach the markers."""
+        there = self.points[ids]
+        apart = np.linalg.norm(there[:, None] - there[None], axis=2)
+        neighbours = np.nonzero((apart > 0) & (apart < 1.1 * self.square))
+        if not len(neighbours[0]):
+            return pixels
+        steps = np.linalg.norm(pixels[neighbours[0]] - pixels[neighbours[1]], axis=1)
+        gap = (self.square - self.marker) / 2 / self.square * float(steps.min())
+        return _refined(image, pixels, _CHARUCO_WINDOW * gap)
 
     @property
     def title(self) -> str:
@@ -232,10 +248,11 @@ class AprilGrid:
         # A mirrored order is that of the detector: clockwise in the image, from any corner on.
         order = _order_of_corners(self.points, tags)
         ids = np.concatenate([4 * number + order for number in tags])
-        rough = np.concatenate(list(tags.values()))
-        pixels = _refined(image, rough, rough.reshape(-1, 4, 2))
-        inside = np.linalg.norm(pixels - rough, axis=1) < _MOST_WINDOW
-        return BoardCorners(ids[inside], pixels[inside]) if inside.sum() >= LEAST_CORNERS else None
+        pixels, sure = zip(*(_refined_tag(image, quad) for quad in tags.values()), strict=True)
+        good = np.concatenate(sure)
+        if good.sum() < LEAST_CORNERS:
+            return None
+        return BoardCorners(ids[good], np.concatenate(pixels)[good])
 
     @property
     def title(self) -> str:
@@ -270,17 +287,19 @@ def _order_of_corners(points: FloatArray, tags: dict[int, FloatArray]) -> IntArr
     return np.asarray(best, np.int64)
 
 
-def _refined(image: ByteArray, pixels: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Move corners to the saddle points beside them.
+def _refined_tag(image: ByteArray, quad: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Refine the corners (4, 2) of a tag, and tell which of them were found."""
+    side = float(np.linalg.norm(quad - np.roll(quad, 1, axis=0), axis=1).min())
+    pixels = quad
+    for part in _TAG_WINDOWS:
+        pixels = _refined(image, pixels, part * side)
+    moved = np.linalg.norm(pixels - quad, axis=1)
+    # A corner that would leave the window stays where it was.
+    return pixels, (moved > 0) & (moved < _TAG_WINDOWS[0] * side)
 
-    `sizes` are the corners, from whose distances the window follows: all, or four per tag.
-    """
-    if sizes.ndim == 3:
-        sides = np.linalg.norm(np.diff(sizes, axis=1), axis=2).min()
-        window = _WINDOW * float(sides)
-    else:
-        apart = np.linalg.norm(sizes[:, None] - sizes[None], axis=2)
-        window = float(np.min(apart[apart > 0], initial=np.inf)) / 3
+
+def _refined(image: ByteArray, pixels: FloatArray, window: float) -> FloatArray:
+    """Move corners (n, 2) to the saddle points beside them, in a half window of some pixels."""
     half = int(np.clip(window, _LEAST_WINDOW, _MOST_WINDOW))
     refined = cv2.cornerSubPix(
         image,
