@@ -44,9 +44,7 @@ def texture_of(board: Target, n: int = 40) -> Texture:
     squares = np.indices((board.rows + 1, board.columns + 1)).sum(axis=0) % 2 * 255
     grey = np.kron(squares, np.ones((n, n))).astype(np.uint8)
     paper = _on_paper(grey, n / board.square, n // 2)
-    return Texture(
-        paper.grey, paper.pixels_per_metre, (paper.origin[0] + n, paper.origin[1] + n)
-    )
+    return Texture(paper.grey, paper.pixels_per_metre, (paper.origin[0] + n, paper.origin[1] + n))
 
 
 def _on_paper(grey: np.ndarray, per_metre: float, margin: int) -> Texture:
@@ -106,7 +104,10 @@ class BoardRenderer:
             for values in (u, v)
         ]
         samples = cv2.remap(
-            texture.grey, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
+            texture.grey,
+            *maps,
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
             borderValue=_BACKGROUND,
         )
         return cv2.resize(samples, (width, height), interpolation=cv2.INTER_AREA)
