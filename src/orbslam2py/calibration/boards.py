@@ -95,15 +95,12 @@ class CharucoBoard:
                 f"{self.square:g} m; markers lie inside of the squares: give the smaller length "
                 "as the marker's"
             )
-        _dictionary(self.dictionary)
-        try:
-            self._detectors  # noqa: B018 - makes the boards of OpenCV
-        except cv2.error:
-            n = self.columns * self.rows // 2
+        n = self.columns * self.rows // 2
+        if len(_dictionary(self.dictionary).bytesList) < n:
             raise SettingsError(
                 f"the dictionary {self.dictionary} has fewer than the {n} markers of a board of "
                 f"{self.columns} x {self.rows} squares; give the dictionary of the board"
-            ) from None
+            )
 
     @property
     def points(self) -> FloatArray:

@@ -18,7 +18,6 @@ from orbslam2py.settings.foreign import filled_line
 from orbslam2py.settings.groups import DISTORTION_FIELDS
 from orbslam2py.settings.keys import focal_problems
 
-
 #: OpenCV's model with 12 coefficients.
 THIN_PRISM = "thin_prism"
 

@@ -66,7 +66,7 @@ def calibrate(
     sources: Annotated[
         list[Path],
         typer.Argument(
-            metavar="SOURCE...",
+            metavar="SOURCE",
             help="Video, or folder of images, of a board seen by the camera; one for each camera "
             "of a pair (left, right) or rig.",
         ),

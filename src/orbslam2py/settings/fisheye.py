@@ -22,7 +22,7 @@ LENS_PARAMETERS: dict[str, tuple[str, ...]] = {
     "eucm": ("alpha", "beta"),
     "mei": ("xi", "k1", "k2", "p1", "p2"),
     "fov": ("omega",),
-    "thin_prism": tuple("k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4".split()),
+    "thin_prism": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"),
 }
 #: Names of the parameters, and the parameters that only fisheye models have.
 ALL_PARAMETERS = tuple(dict.fromkeys(name for names in LENS_PARAMETERS.values() for name in names))

@@ -165,5 +165,5 @@ def test_what_files_cannot_hold(pair: RigCalibration) -> None:
     one = pair.cameras[1]
     other = type(one)(small, one.deviations, one.rms, one.board, one.views, (), 1, 1)
     rig = type(pair)((pair.cameras[0], other), pair.T_c0, pair.deviations, 0.1, (0.1, 0.1), 9, 9)
-    with pytest.raises(SettingsError, match="640 x 480 and 640 x 400, .* at the same resolution"):
+    with pytest.raises(SettingsError, match=r"640 x 480 and 640 x 400, .* at the same resolution"):
         pair_settings_text(rig, fps=30)
