@@ -22,7 +22,7 @@ RIGHT = CameraModel("radtan4", [268, 268, 162, 118, -0.2, 0.05, 0, 0], (320, 240
 #: 150 and 190 degrees from side to side.
 WIDE = {
     150: CameraModel("double_sphere", [112, 112, 159, 161, -0.17, 0.59], (320, 320)),
-    190: CameraModel("kannala_brandt", [95, 95, 159, 161, 0.01, -0.004, 0.001, -2e-4], (320, 320)),
+    190: CameraModel("kannala_brandt", [118, 118, 199, 201, 0.01, -4e-3, 1e-3, -2e-4], (400, 400)),
 }
 
 
@@ -44,17 +44,22 @@ def write(folder: Path, camera: CameraModel, board: Target, poses: list[np.ndarr
 @pytest.mark.parametrize("degrees", WIDE)
 def test_a_wide_lens(command: CommandLine, tmp_path: Path, degrees: int) -> None:
     true = WIDE[degrees]
-    board = AprilGrid(3, 3, 0.05)
-    poses = board_poses(board, 9, 0.42 * degrees, (0.13, 0.2))
+    board: Target = AprilGrid(3, 3, 0.05)
+    arguments: tuple[str, ...] = ("--board", "aprilgrid:3x3", "--square", "0.05")
+    if degrees > 180:
+        board, arguments = CHARUCO, CHARUCO_OPTIONS
+    poses = board_poses(board, 9, 0.42 * degrees, (0.14, 0.2))
     write(tmp_path / "views", true, board, poses)
-    arguments = ("--board", "aprilgrid:3x3", "--square", "0.05", "--model", true.name)
-    done = command("calibrate", "views", *arguments, "-o", "my.yaml", "--plot", "plot.png")
+    arguments += ("--model", true.name, "--plot", "plot.png")
+    done = command("calibrate", "views", *arguments, "-o", "my.yaml")
     assert done.code == 0, done.err
-    camera = Settings.load(tmp_path / "my.yaml", Sensor.MONOCULAR).camera.camera_model(320, 320)
-    u, v = np.meshgrid(np.arange(20, 320, 35.0), np.arange(20, 320, 35.0))
+    camera = Settings.load(tmp_path / "my.yaml", Sensor.MONOCULAR).camera.camera_model(
+        *true.image_size
+    )
+    u, v = np.meshgrid(np.arange(20, 400, 35.0), np.arange(20, 400, 35.0))
     pixels = np.column_stack([u.ravel(), v.ravel()])
     radius = np.linalg.norm(pixels - np.array(true.parameters[2:4]), axis=1)
-    inside = pixels[radius < 150]
+    inside = pixels[radius < 0.45 * true.image_size[0]]
     assert ray_errors(camera, true, inside).max() < 0.35
     assert (tmp_path / "plot.png").is_file()
 
