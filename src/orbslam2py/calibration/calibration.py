@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calibration of a camera from views of a chessboard.
+"""Calibration of a camera from views of a board.
 
-The model is that of `orbslam2py.settings.CameraSettings`: a pinhole with OpenCV's radial and
-tangential distortion (Zhang, "A flexible new technique for camera calibration", 2000; the solver
-is OpenCV's).
+All lens models of `orbslam2py.CameraModel` can be calibrated. OpenCV's solver (Zhang, "A flexible
+new technique for camera calibration", 2000) gives the start of its own models;
+`orbslam2py.calibration.first_guess` gives that of the others.
 """
 
 from __future__ import annotations
@@ -12,20 +12,24 @@ import logging
 from dataclasses import dataclass
 from os import PathLike
 
-import cv2
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
-from orbslam2py.calibration.camera_model import camera_settings
-from orbslam2py.calibration.chessboard import Board, BoardView, BoardViews, choose_views
-from orbslam2py.errors import DatasetError
-from orbslam2py.settings import (
-    OrbSettings,
-    Sensor,
-    Settings,
-    settings_for_camera,
+from orbslam2py.calibration.boards import Target
+from orbslam2py.calibration.bundle import AdjustedScene, Sighting, adjust
+from orbslam2py.calibration.camera_model import settings_of_model
+from orbslam2py.calibration.chessboard import BoardView, BoardViews, choose_views
+from orbslam2py.calibration.families import OPENCV_FAMILIES, family_of
+from orbslam2py.calibration.selection import (
+    FamilyScore,
+    best_of,
+    compare_families,
+    solve_family,
 )
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.settings import OrbSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings.camera_model import CameraModel
 
 _log = logging.getLogger(__name__)
 
@@ -42,6 +46,8 @@ _GOOD_SIGMA = 0.005
 _OUTLYING = 3.0
 _WORST_FINE = 0.5
 _GRID = (8, 6)
+#: Coefficients of OpenCV's models without a denominator: k1, k2, p1, p2, k3.
+_RADIAL_TANGENTIAL = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,36 +86,58 @@ class Calibration:
 
     Attributes
     ----------
-    K
-        Camera matrix (3, 3), pixels.
-    distortion
-        k1, k2, p1, p2, k3, (5,).
+    camera
+        The camera with its lens.
     deviations
-        Standard deviations of fx, fy, cx, cy [pixels], k1, k2, p1, p2, k3; (9,).
-    size
-        Width and height of the images [pixels].
+        Standard deviations of fx, fy, cx, cy [pixels] and of `distortion`.
     rms
         Reprojection error over all corners: root mean square of the distances [pixels].
     board
-        The chessboard.
+        The board.
     views
         The views from which the camera was calibrated.
     left_out
         Names of views that did not fit the others.
     n_searched, n_found
         Images looked at, and those with the board.
+    scores
+        Errors of the lens models that were compared; empty if one was asked for.
     """
 
-    K: FloatArray
-    distortion: FloatArray
+    camera: CameraModel
     deviations: FloatArray
-    size: tuple[int, int]
     rms: float
-    board: Board
+    board: Target
     views: tuple[CalibratedView, ...]
     left_out: tuple[str, ...]
     n_searched: int
     n_found: int
+    scores: tuple[FamilyScore, ...] = ()
+
+    @property
+    def family(self) -> str:
+        """The lens model, by its name in `orbslam2py.CameraModel`."""
+        return self.camera.name
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the images [pixels]."""
+        return self.camera.image_size
+
+    @property
+    def K(self) -> FloatArray:
+        """Focal lengths and principal point as a camera matrix (3, 3), pixels."""
+        fx, fy, cx, cy = self.camera.parameters[:4]
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def distortion(self) -> FloatArray:
+        """Coefficients of the lens after fx, fy, cx, cy.
+
+        For ``pinhole``, ``radtan4`` and ``radtan5`` always k1, k2, p1, p2, k3, (5,); for other
+        models in the order of `orbslam2py.CameraModel`.
+        """
+        return padded(self.camera, np.array(self.camera.parameters))[4:]
 
     @property
     def residuals(self) -> FloatArray:
@@ -133,6 +161,11 @@ class Calibration:
         lengths = [float(np.linalg.norm(view.T_cb[:3, 3])) for view in self.views]
         return min(lengths), max(lengths)
 
+    @property
+    def angle_seen(self) -> float:
+        """Largest angle of a corner from the optical axis [rad]."""
+        return angle_from_axis(self.camera, self.corners)
+
     def warnings(self) -> list[str]:
         """Say what makes this calibration doubtful."""
         found = []
@@ -144,16 +177,31 @@ class Calibration:
                 "corners too"
             )
         if self.rms > _GOOD_RMS:
+            other = "" if self.scores else ", does the lens model fit (leave --model out)"
             found.append(
                 f"the reprojection error of {self.rms:.2f} pixels is high; is the board flat, are "
-                "the images sharp?"
+                f"the images sharp{other}?"
             )
-        if self.deviations[0] > _GOOD_SIGMA * self.K[0, 0]:
+        focal, deviation = self.K[0, 0], float(self.deviations[0])
+        # xi and alpha trade with the focal length, which alone says nothing there.
+        if self.family in OPENCV_FAMILIES and deviation > _GOOD_SIGMA * focal:
             found.append(
-                f"the focal length is uncertain: {self.K[0, 0]:.1f} +- {self.deviations[0]:.1f} "
+                f"the focal length is uncertain: {focal:.1f} +- {deviation:.1f} "
                 "pixels; slant the board more"
             )
+        found += self._warnings_of_border()
         return found
+
+    def _warnings_of_border(self) -> list[str]:
+        width, height = self.size
+        u, v = (width - 1) / 2, (height - 1) / 2
+        borders = [[0, v], [width - 1, v], [u, 0], [u, height - 1]]
+        if np.isfinite(self.camera.unproject(borders)).all():
+            return []
+        return [
+            f"the {self.family} lens shows nothing at a border of the image; hold the board there "
+            "too, or choose another lens model (--model)"
+        ]
 
     def settings(
         self,
@@ -183,9 +231,8 @@ class Calibration:
         SettingsError
             If a number is out of range.
         """
-        camera = camera_settings(self.K, self.distortion, self.size, fps=fps, rgb=rgb)
         return settings_for_camera(
-            camera,
+            settings_of_model(self.camera, fps=fps, rgb=rgb),
             sensor,
             baseline=baseline,
             depth_factor=depth_factor,
@@ -234,8 +281,19 @@ class Calibration:
             stream.write(f"{first}\n{note}\n{rest}")
 
 
+def angle_from_axis(camera: CameraModel, pixels: FloatArray) -> float:
+    """Largest angle of pixels (n, 2) from the optical axis [rad]."""
+    rays = camera.unproject(pixels)
+    return float(np.nanmax(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2])))
+
+
 def calibrate(
-    found: BoardViews, board: Board, *, max_views: int = 40, k3: bool = False
+    found: BoardViews,
+    board: Target,
+    *,
+    max_views: int = 40,
+    k3: bool = False,
+    model: str | None = None,
 ) -> Calibration:
     """Calibrate a camera.
 
@@ -248,13 +306,62 @@ def calibrate(
     max_views
         Most views to use: those that differ most.
     k3
-        Estimate the third radial coefficient: for wide lenses, where k1 and k2 leave residuals
-        at the border.
+        The same as the model ``radtan5``.
+    model
+        Lens model, by its name in `orbslam2py.CameraModel`. By default the one of least
+        cross-validated error is chosen; of several that are equally good, the one that most
+        programs read.
 
     Raises
     ------
     DatasetError
         If there are too few different views, or they determine no camera.
+    SettingsError
+        If there is no such model, or `k3` contradicts it.
+    """
+    wanted = wanted_family(model, k3=k3)
+    views = enough_views(found, max_views)
+    sightings = sightings_of(views, board)
+    scores: list[FamilyScore] = []
+    if wanted is None:
+        scores = compare_families(sightings, found.size)
+        wanted = best_of(scores).family
+    solved = solve_family(wanted, sightings, found.size)
+    views, left_out, solved = without_bad_views(views, board, solved)
+    scene = solved.scene
+    calibrated = [
+        CalibratedView(view.name, one.corners, scene.projected(one), scene.T_0b[one.moment])
+        for view, one in zip(views, sightings_of(views, board), strict=True)
+    ]
+    camera = scene.cameras[0]
+    return Calibration(
+        camera=camera,
+        deviations=padded(camera, solved.deviations(0)),
+        rms=solved.rms,
+        board=board,
+        views=tuple(calibrated),
+        left_out=left_out,
+        n_searched=found.n_searched,
+        n_found=len(found.views),
+        scores=tuple(scores),
+    )
+
+
+def wanted_family(model: str | None, *, k3: bool = False) -> str | None:
+    """Return the family of lenses that was asked for, or None for the best one."""
+    family = None if model is None else family_of(model)
+    if k3 and family not in (None, "radtan5"):
+        raise SettingsError(f"k3 goes with the model radtan5, not with {family}; leave k3 out")
+    return "radtan5" if k3 else family
+
+
+def enough_views(found: BoardViews, max_views: int) -> list[BoardView]:
+    """Choose views that differ most.
+
+    Raises
+    ------
+    DatasetError
+        If there are too few.
     """
     views = choose_views(found, max_views)
     if len(views) < LEAST_VIEWS:
@@ -263,52 +370,41 @@ def calibrate(
             f"of {found.n_searched} images); at least {LEAST_VIEWS} are needed, {_GOOD_VIEWS} or "
             "more are good: move and slant the board"
         )
-    calibration = _solve(views, found, board, k3=k3, left_out=())
-    errors = np.array([view.error for view in calibration.views])
-    fine = errors <= max(_OUTLYING * float(np.median(errors)), _WORST_FINE)
-    if not fine.all() and int(fine.sum()) >= LEAST_VIEWS:
-        left_out = tuple(view.name for view, good in zip(views, fine, strict=True) if not good)
-        _log.info("views that do not fit the others are left out: %s", ", ".join(left_out))
-        kept = [view for view, good in zip(views, fine, strict=True) if good]
-        calibration = _solve(kept, found, board, k3=k3, left_out=left_out)
-    return calibration
+    return views
 
 
-def _solve(
-    views: list[BoardView], found: BoardViews, board: Board, *, k3: bool, left_out: tuple[str, ...]
-) -> Calibration:
-    points = board.points
-    try:
-        rms, K, distortion, rotations, translations, deviations, _, _ = cv2.calibrateCameraExtended(
-            [points.astype(np.float32)] * len(views),
-            [view.corners.astype(np.float32) for view in views],
-            found.size,
-            np.zeros((3, 3)),
-            np.zeros(5),
-            flags=0 if k3 else cv2.CALIB_FIX_K3,
-        )
-    except cv2.error as error:
-        raise DatasetError(f"the views determine no camera: {error}") from error
-    matrix = np.asarray(K, dtype=np.float64)
-    coefficients = np.asarray(distortion, dtype=np.float64).reshape(-1)[:5]
-    if not (np.isfinite(matrix).all() and np.isfinite(coefficients).all() and matrix[0, 0] > 0):
-        raise DatasetError("the views determine no camera: slant the board, and move it more")
-    calibrated = []
-    for view, rotation, translation in zip(views, rotations, translations, strict=True):
-        projected, _ = cv2.projectPoints(points, rotation, translation, matrix, coefficients)
-        T_cb = np.eye(4)
-        T_cb[:3, :3], T_cb[:3, 3] = cv2.Rodrigues(rotation)[0], np.ravel(translation)
-        projected = np.asarray(projected, np.float64).reshape(-1, 2)
-        calibrated.append(CalibratedView(view.name, view.corners, projected, T_cb))
-    return Calibration(
-        K=matrix,
-        distortion=coefficients,
-        deviations=np.asarray(deviations, np.float64).reshape(-1)[:9],
-        size=found.size,
-        rms=float(rms),
-        board=board,
-        views=tuple(calibrated),
-        left_out=left_out,
-        n_searched=found.n_searched,
-        n_found=len(found.views),
+def sightings_of(views: list[BoardView], board: Target) -> list[Sighting]:
+    """The corners of views of one camera; each view is a moment of its own."""
+    return [
+        Sighting(0, moment, view.points_of(board), view.corners)
+        for moment, view in enumerate(views)
+    ]
+
+
+def without_bad_views(
+    views: list[BoardView], board: Target, solved: AdjustedScene
+) -> tuple[list[BoardView], tuple[str, ...], AdjustedScene]:
+    """Leave out views that do not fit the others, and solve again."""
+    scene = solved.scene
+    errors = np.array(
+        [
+            np.sqrt(((one.corners - scene.projected(one)) ** 2).sum(axis=1).mean())
+            for one in sightings_of(views, board)
+        ]
     )
+    fine = errors <= max(_OUTLYING * float(np.median(errors)), _WORST_FINE)
+    if fine.all() or int(fine.sum()) < LEAST_VIEWS:
+        return views, (), solved
+    left_out = tuple(view.name for view, good in zip(views, fine, strict=True) if not good)
+    _log.info("views that do not fit the others are left out: %s", ", ".join(left_out))
+    kept = [view for view, good in zip(views, fine, strict=True) if good]
+    poses = tuple(T for T, good in zip(scene.T_0b, fine, strict=True) if good)
+    begin = type(scene)(scene.cameras, scene.T_c0, poses)
+    return kept, left_out, adjust(begin, sightings_of(kept, board))
+
+
+def padded(camera: CameraModel, values: FloatArray) -> FloatArray:
+    """Fill up what models of the radial-tangential lens lack, with zeros."""
+    if camera.name not in ("pinhole", "radtan4", "radtan5"):
+        return values
+    return np.concatenate([values, np.zeros(4 + _RADIAL_TANGENTIAL - len(values))])

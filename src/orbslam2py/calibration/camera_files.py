@@ -48,6 +48,8 @@ class CameraFileFormat(str, Enum):
     RECORD3D = "record3d"
     POLYCAM = "polycam"
     FCA = "fca"
+    WOODSCAPE = "woodscape"
+    ARIA = "aria"
     NUMBERS = "numbers"
 
     def __str__(self) -> str:

@@ -12,10 +12,14 @@ from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.settings.camera_model import CameraModel
 from orbslam2py.settings.fisheye import PINHOLE
 from orbslam2py.settings.foreign import filled_line
 from orbslam2py.settings.groups import DISTORTION_FIELDS
 from orbslam2py.settings.keys import focal_problems
+
+#: OpenCV's model with 12 coefficients.
+THIN_PRISM = "thin_prism"
 
 
 def camera_settings(
@@ -28,11 +32,13 @@ def camera_settings(
     model: str = PINHOLE,
     lens: tuple[float, ...] = (),
 ) -> CameraSettings:
-    """Camera settings of a matrix (3, 3) [pixels], up to eight coefficients, width and height.
+    """Camera settings of a matrix (3, 3) [pixels], up to 12 coefficients, width and height.
 
     `model` and `lens` are as in `orbslam2py.CameraSettings`.
     """
     width, height = size or (None, None)
+    if distortion.size > len(DISTORTION_FIELDS):
+        model, lens, distortion = THIN_PRISM, tuple(distortion.tolist()), np.zeros(0)
     return CameraSettings(
         fx=K[0, 0],
         fy=K[1, 1],
@@ -45,6 +51,26 @@ def camera_settings(
         rgb=rgb,
         model=model,
         lens=lens,
+    )
+
+
+def settings_of_model(camera: CameraModel, *, fps: float, rgb: bool = False) -> CameraSettings:
+    """Camera settings of a camera model; `fps` and `rgb` are as in `orbslam2py.CameraSettings`."""
+    fx, fy, cx, cy, *lens = camera.parameters
+    width, height = camera.image_size
+    perspective = camera.name in ("pinhole", "radtan4", "radtan5", "rational")
+    return CameraSettings(
+        fx=fx,
+        fy=fy,
+        cx=cx,
+        cy=cy,
+        **(dict(zip(DISTORTION_FIELDS, lens, strict=False)) if perspective else {}),
+        width=width,
+        height=height,
+        fps=fps,
+        rgb=rgb,
+        model=PINHOLE if perspective else camera.name,
+        lens=() if perspective else tuple(lens),
     )
 
 
@@ -109,7 +135,7 @@ def checked_camera_matrix(
 def opencv_coefficients(
     path: object, coefficients: object, K: FloatArray, size: tuple[int, int] | None
 ) -> FloatArray:
-    """Bring coefficients in OpenCV's order to as few as there must be; float64 (5,) or (8,).
+    """Bring coefficients in OpenCV's order to as few as there must be; float64 (5,), (8,) or (12,).
 
     Parameters
     ----------
@@ -123,7 +149,7 @@ def opencv_coefficients(
     Raises
     ------
     SettingsError
-        If there is another number of them, or those beyond the eighth are not zero.
+        If there is another number of them, or those beyond the twelfth are not zero.
     """
     given = checked_numbers(path, "the distortion", coefficients, ())
     if given.size not in (0, 4, 5, 8, 12, 14):
@@ -131,13 +157,15 @@ def opencv_coefficients(
             f"{path}: {number_of(given.size, 'distortion coefficient')}; give k1, k2, p1, p2 and "
             "perhaps k3, or k3, k4, k5, k6, as OpenCV has them (0 for those there are not)"
         )
-    if np.any(given[8:]):
+    if np.any(given[12:]):
         raise SettingsError(
-            f"{path}: distortion with {given.size} coefficients (thin prism or tilted model) is "
-            "not supported, only the first 8; undistort the images with OpenCV (cv2.undistort "
+            f"{path}: distortion with {given.size} coefficients (a tilted sensor) is "
+            "not supported, only the first 12; undistort the images with OpenCV (cv2.undistort "
             "with K and D of this file), and make settings of the undistorted images:\n"
             f"    {filled_line(K, size, Sensor.MONOCULAR)}"
         )
+    if np.any(given[8:]):
+        return given[:12]
     all_of_them = np.zeros(8)
     all_of_them[: min(given.size, 8)] = given[:8]
     return all_of_them if np.any(all_of_them[5:]) else all_of_them[:5]

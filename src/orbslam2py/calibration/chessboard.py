@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Views of a chessboard: found in images, and the most telling ones chosen."""
+"""Views of a board: found in images, and those chosen that differ most."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from orbslam2py._arguments import finite_number, is_whole, path_of, shown
-from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.calibration.boards import BoardCorners, Target
 from orbslam2py.datasets import VideoReader
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
@@ -88,6 +89,21 @@ class Board:
         grid[:, :2] = np.mgrid[: self.columns, : self.rows].T.reshape(-1, 2) * self.square
         return grid
 
+    @property
+    def title(self) -> str:
+        """What the board consists of, for messages."""
+        return f"{self} inner corners"
+
+    @property
+    def advice(self) -> str:
+        """What to check if the board is found in no image."""
+        return "count the inner corners, not the squares, and have the whole board in view"
+
+    def find(self, image: ByteArray) -> BoardCorners | None:
+        """Find all corners in a grey image uint8 (h, w); None if not all are seen."""
+        corners = find_board(image, self)
+        return None if corners is None else BoardCorners(np.arange(len(corners)), corners)
+
     def __str__(self) -> str:
         return f"{self.columns}x{self.rows}"
 
@@ -101,11 +117,18 @@ class BoardView:
     name
         File name, or number of the frame in the video.
     corners
-        Pixels, float64 (n, 2), in the order of `Board.points`.
+        Pixels, float64 (n, 2).
+    ids
+        Their rows in the points of the board, (n,); None if these are all, in this order.
     """
 
     name: str
     corners: FloatArray
+    ids: IntArray | None = None
+
+    def points_of(self, board: Target) -> FloatArray:
+        """The corners in the frame of the board, (n, 3) metres."""
+        return board.points if self.ids is None else board.points[self.ids]
 
 
 @dataclass
@@ -122,6 +145,8 @@ class BoardViews:
         Images looked at, and those that could not be read.
     fps
         Frames per second of the video, None for a folder.
+    names
+        Names of all images that could be read, in order.
     """
 
     size: tuple[int, int] = (0, 0)
@@ -129,6 +154,7 @@ class BoardViews:
     n_searched: int = 0
     n_unreadable: int = 0
     fps: float | None = None
+    names: list[str] = field(default_factory=list)
 
 
 def find_board(image: ByteArray, board: Board) -> FloatArray | None:
@@ -169,7 +195,7 @@ def find_board(image: ByteArray, board: Board) -> FloatArray | None:
 
 def find_views(
     source: str | Path,
-    board: Board,
+    board: Target,
     *,
     every: int | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -202,9 +228,11 @@ def find_views(
             result.n_unreadable += 1
         else:
             _check_size(source, name, (image.shape[1], image.shape[0]), result)
-            corners = find_board(image, board)
-            if corners is not None:
-                result.views.append(BoardView(name, corners))
+            result.names.append(name)
+            found = board.find(_grey(image))
+            if found is not None:
+                ids = None if isinstance(board, Board) else found.ids
+                result.views.append(BoardView(name, found.pixels, ids))
         if progress is not None:
             progress(result.n_searched, len(result.views))
     if result.n_unreadable == result.n_searched:
@@ -213,8 +241,8 @@ def find_views(
         )
     if not result.views:
         raise DatasetError(
-            f"no board of {board} inner corners in any of the {result.n_searched} images of "
-            f"{source}; count the inner corners, not the squares, and have the whole board in view"
+            f"no board of {board.title} in any of the {result.n_searched} images of {source}; "
+            f"{board.advice}"
         )
     return result
 

@@ -33,7 +33,8 @@ class ForeignCamera:
         Camera matrix (3, 3), pixels; the centre of the top-left pixel is (0, 0). None for a lens
         that is not supported.
     distortion
-        OpenCV's k1, k2, p1, p2, k3, (5,), or with k4, k5, k6, (8,). Other lenses: all 0.
+        OpenCV's k1, k2, p1, p2, k3, (5,), with k4, k5, k6, (8,), and with s1 to s4, (12,). Other
+        lenses: all 0.
     size
         Width and height [pixels]; None if the file does not tell.
     lens

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile
 from orbslam2py.calibration.readers.colmap import read_colmap
 from orbslam2py.calibration.readers.devices import read_oak, read_zed
+from orbslam2py.calibration.readers.fitted import read_aria, read_woodscape
 from orbslam2py.calibration.readers.kalibr import read_kalibr
 from orbslam2py.calibration.readers.kitti import read_kitti
 from orbslam2py.calibration.readers.opencv import read_opencv
@@ -50,5 +51,7 @@ READERS: Mapping[str, Reader] = {
     "record3d": read_record3d,
     "polycam": read_polycam,
     "fca": read_fca,
+    "woodscape": read_woodscape,
+    "aria": read_aria,
     "numbers": read_numbers,
 }

@@ -10,27 +10,33 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from orbslam2py._figures import check_picture_name
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.calibration import (
-    Board,
     BoardViews,
-    Calibration,
     CameraFileFormat,
+    Target,
+    calibrate_rig,
     find_views,
+    parse_board,
     read_camera_file,
 )
 from orbslam2py.calibration import calibrate as calibrate_views
+from orbslam2py.calibration.calibration import wanted_family
 from orbslam2py.calibration.plot import draw_residuals
+from orbslam2py.calibration.rig_files import check_camchain
+from orbslam2py.cli.calibration_results import (
+    lines_of_depth,
+    print_results,
+    write_rig,
+)
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.synthesize import parse_size
 from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.errors import OutputFileError, SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
 from orbslam2py.settings.check import warn_of_doubts
-from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
 from orbslam2py.settings.pair_views import views_of_pair
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
@@ -57,14 +63,39 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Only errors.")]
 
 
 def calibrate(
-    source: Annotated[
-        Path, typer.Argument(help="Video, or folder of images, of a chessboard seen by the camera.")
+    sources: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SOURCE",
+            help="Video, or folder of images, of a board seen by the camera; one for each camera "
+            "of a pair (left, right) or rig.",
+        ),
     ],
     board: Annotated[
-        str, typer.Option(metavar="CxR", help="Inner corners of the board, such as 9x6.")
+        str,
+        typer.Option(
+            metavar="BOARD",
+            help="9x6: inner corners of a chessboard. charuco:11x8: squares. aprilgrid:6x6: tags. "
+            "Or a target file of Kalibr.",
+        ),
     ],
-    square: Annotated[float, typer.Option(help="Side of a square [m].")],
     output: Output,
+    square: Annotated[float | None, typer.Option(help="Side of a square, or of a tag [m].")] = None,
+    marker: Annotated[float | None, typer.Option(help="ChArUco: side of a marker [m].")] = None,
+    dictionary: Annotated[
+        str | None, typer.Option(help="ChArUco: dictionary of the markers [4X4_50].")
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option(help="AprilGrid: gap between two tags by the side of a tag [0.3]."),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            help="Lens model: pinhole, radtan4, radtan5, rational, thin_prism, kannala_brandt, "
+            "double_sphere, eucm, mei or fov [that of least cross-validated error]."
+        ),
+    ] = None,
     fps: Fps = None,
     features: Features = None,
     every: Annotated[
@@ -77,58 +108,119 @@ def calibrate(
     max_views: Annotated[
         int, typer.Option(help="Most views to use: those that differ most.", min=4)
     ] = 40,
-    k3: Annotated[bool, typer.Option("--k3", help="Estimate k3 as well: for wide lenses.")] = False,
+    k3: Annotated[bool, typer.Option("--k3", help="The same as --model radtan5.")] = False,
     plot: Annotated[
-        Path | None, typer.Option(help="Picture of the residuals (.png, .jpg, .svg, .pdf ...).")
+        Path | None,
+        typer.Option(
+            help="Picture of the residuals (.png, .jpg, .svg, .pdf ...); of several cameras one "
+            "each."
+        ),
+    ] = None,
+    camchain: Annotated[
+        Path | None, typer.Option(help="Several cameras: also write a camchain of Kalibr.")
     ] = None,
     sensor: Annotated[
-        Sensor, typer.Option(help="What the settings are for: mono, or rgbd.")
-    ] = Sensor.MONOCULAR,
+        Sensor | None,
+        typer.Option(
+            help="What the settings are for [mono for one source, stereo for two; a rig of more "
+            "gives a camchain]."
+        ),
+    ] = None,
     depth_factor: DepthFactor = None,
     baseline: Baseline = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Calibrate a camera with a chessboard; write a settings file that run takes."""
-    if sensor is Sensor.STEREO:
-        raise SettingsError(
-            "calibrate sees one camera, and a pair needs both together; calibrate it with Kalibr "
-            "and give its file to orbslam2py import-camera"
-        )
+    """Calibrate a camera, a stereo pair or a rig with a board; write settings that run takes."""
     # What does not go together is refused before the long search.
-    a_camera = CameraSettings(1.0, 1.0, 0.0, 0.0, fps=30.0 if fps is None else fps)
-    orb = None if features is None else OrbSettings(n_features=features)
-    settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=orb)
-    model = Board.parse(board, square)
-    images = [path for path in source.glob("*") if _is_image(path)]
-    check_apart({"--output": output, "--plot": plot}, [source, *images])
-    if plot is not None:
-        _check_plot(plot, source)
-    for path in (output, plot):
-        check_target(path, force=force)
+    for_what = _sensor_of(sources, sensor)
+    given = {"--baseline": baseline, "--depth-factor": depth_factor, "--k3": k3 or None}
+    if len(sources) == 1:
+        _refuse_camchain(camchain)
+        a_camera = CameraSettings(1.0, 1.0, 0.0, 0.0, fps=30.0 if fps is None else fps)
+        orb = None if features is None else OrbSettings(n_features=features)
+        settings_for_camera(
+            a_camera, for_what, baseline=baseline, depth_factor=depth_factor, orb=orb
+        )
+    else:
+        _refuse_single(given)
+    family = wanted_family(model, k3=k3)
+    if camchain is not None or len(sources) > 2:
+        check_camchain(family or "radtan4")
+    target = parse_board(board, square, marker=marker, dictionary=dictionary, spacing=spacing)
+    images = [path for source in sources for path in source.glob("*") if _is_image(path)]
+    check_apart({"--output": output, "--plot": plot, "--camchain": camchain}, [*sources, *images])
+    plots = _plots_of(plot, len(sources))
+    for picture, source in zip(plots, sources, strict=False):
+        _check_plot(picture, source)
+    for target_file in (output, camchain, *plots):
+        check_target(target_file, force=force)
     console = Console(quiet=quiet)
-    found = _search(source, model, every, console)
-    result = calibrate_views(found, model, max_views=max_views, k3=k3)
-    result.save(
-        output,
-        fps=fps or found.fps or 30.0,
-        n_features=features,
-        sensor=sensor,
-        depth_factor=depth_factor,
-        baseline=baseline,
-    )
-    if plot is not None:
-        draw_residuals(plot, result, title=f"Calibration from {source.name}")
-    console.print(_table(result, source))
-    if sensor is Sensor.RGBD and depth_factor is None:
-        console.print(ASSUMED_DEPTH_FACTOR, highlight=False)
-    elif sensor is Sensor.RGBD:
-        console.print(f"depth images: {depth_factor:g} units per metre", highlight=False)
-    for warning in result.warnings():
-        console.print(f"[bold yellow]Warning:[/] {escape(warning)}", highlight=False)
-    console.print(f"Settings are in [bold]{escape(str(output))}[/]", highlight=False)
-    if plot is not None:
-        console.print(f"Look at [bold]{escape(str(plot))}[/]", highlight=False)
+    found = [_search(source, target, every, console) for source in sources]
+    rate = fps or found[0].fps or 30.0
+    if len(sources) == 1:
+        result = calibrate_views(found[0], target, max_views=max_views, model=family)
+        result.save(
+            output,
+            fps=rate,
+            n_features=features,
+            sensor=for_what,
+            depth_factor=depth_factor,
+            baseline=baseline,
+        )
+        cameras, lines = [result], [*lines_of_depth(for_what, depth_factor)]
+        warnings = result.warnings()
+    else:
+        rig = calibrate_rig(found, target, max_views=max_views, model=family)
+        cameras = list(rig.cameras)
+        lines, warnings = write_rig(rig, sources, output, camchain, fps=rate, n_features=features)
+    for path, one, source in zip(plots, cameras, sources, strict=False):
+        draw_residuals(path, one, title=f"Calibration from {source.name}")
+    print_results(console, cameras, sources, lines, warnings)
+    what = "Settings are" if len(sources) <= 2 else "The camchain is"
+    console.print(f"{what} in [bold]{escape(str(output))}[/]", highlight=False)
+    for path in plots:
+        console.print(f"Look at [bold]{escape(str(path))}[/]", highlight=False)
+
+
+def _sensor_of(sources: list[Path], sensor: Sensor | None) -> Sensor:
+    """The sensor that the sources are for."""
+    if sensor is None:
+        return Sensor.MONOCULAR if len(sources) == 1 else Sensor.STEREO
+    if sensor is Sensor.STEREO and len(sources) == 1:
+        raise SettingsError(
+            f"--sensor stereo needs the images of both cameras, and there is only {sources[0]}; "
+            "give two folders or videos: the left one, then the right one"
+        )
+    if sensor is not Sensor.STEREO and len(sources) > 1:
+        raise SettingsError(
+            f"--sensor {sensor} is one camera, and {len(sources)} sources are given; give one of "
+            "them, or leave --sensor out to calibrate them together"
+        )
+    return sensor
+
+
+def _refuse_camchain(camchain: Path | None) -> None:
+    if camchain is not None:
+        raise SettingsError("--camchain goes with two sources or more; leave it out for one camera")
+
+
+def _refuse_single(given: dict[str, object]) -> None:
+    for option, value in given.items():
+        if value is not None:
+            raise SettingsError(
+                f"{option} goes with one camera, and several sources are given; leave it out: the "
+                "distances of the cameras are calibrated"
+            )
+
+
+def _plots_of(plot: Path | None, n: int) -> list[Path]:
+    """A picture per camera: ``residuals.png``, or ``residuals_cam0.png`` and so on."""
+    if plot is None:
+        return []
+    if n == 1:
+        return [plot]
+    return [plot.with_stem(f"{plot.stem}_cam{number}") for number in range(n)]
 
 
 def import_camera(
@@ -212,7 +304,7 @@ def _is_image(path: Path) -> bool:
     return path.suffix.lower() in IMAGE_SUFFIXES
 
 
-def _search(source: Path, board: Board, every: int | None, console: Console) -> BoardViews:
+def _search(source: Path, board: Target, every: int | None, console: Console) -> BoardViews:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("looking for the board", total=None)
@@ -221,30 +313,6 @@ def _search(source: Path, board: Board, every: int | None, console: Console) -> 
             bar.update(task, description=f"board seen in {seen} of {searched} images")
 
         return find_views(source, board, every=every, progress=show)
-
-
-def _table(result: Calibration, source: Path) -> Table:
-    table = Table(title=escape(f"{source.name}, board {result.board}"), show_header=False)
-    table.add_column(justify="left")
-    table.add_column(justify="right")
-    nearest, farthest = result.distances
-    width, height = result.size
-    table.add_row("images searched, with board", f"{result.n_searched}, {result.n_found}")
-    table.add_row("views used, left out", f"{len(result.views)}, {len(result.left_out)}")
-    table.add_row("image size", f"{width} x {height}")
-    table.add_row("image covered", f"{result.coverage:.0%}")
-    table.add_row("distance of the board [m]", f"{nearest:.2f} to {farthest:.2f}")
-    table.add_row("reprojection error (RMS) [pixels]", f"{result.rms:.3f}")
-    table.add_section()
-    values = [result.K[0, 0], result.K[1, 1], result.K[0, 2], result.K[1, 2], *result.distortion]
-    names = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
-    for i, (name, value, sigma) in enumerate(
-        zip(names, values, result.deviations.tolist(), strict=True)
-    ):
-        digits = 2 if i < 4 else 5
-        if value or sigma:
-            table.add_row(name, f"{value:.{digits}f} +- {sigma:.{digits}f}")
-    return table
 
 
 EXAMPLE = "{}\n\n**Example**\n\n    orbslam2py {}\n"

@@ -63,13 +63,16 @@ def new(
     distortion: Annotated[
         str | None,
         typer.Option(
-            help="OpenCV's k1,k2,p1,p2, with k3, or with k3,k4,k5,k6 [none].", metavar="NUMBERS"
+            help="OpenCV's k1,k2,p1,p2, with k3, with k3,k4,k5,k6, or with s1,s2,s3,s4 as well "
+            "[none].",
+            metavar="NUMBERS",
         ),
     ] = None,
     model: Annotated[
         str,
         typer.Option(
-            help="Camera model: pinhole, kannala_brandt, double_sphere, eucm, mei or fov."
+            help="Camera model: pinhole, kannala_brandt, double_sphere, eucm, mei, fov or "
+            "thin_prism."
         ),
     ] = PINHOLE,
     lens: Annotated[
@@ -92,7 +95,7 @@ def new(
     width, height = (None, None) if size is None else parse_size(size)
     camera = CameraSettings(fx, fy, cx, cy, width=width, height=height, fps=fps, rgb=rgb)
     settings = settings_for_camera(
-        replace(camera, **_coefficients(distortion), **_lens(model, lens, distortion)),
+        replace(camera, **(_coefficients(distortion) | _lens(model, lens, distortion))),
         sensor,
         baseline=baseline,
         depth_factor=depth_factor,
@@ -152,10 +155,12 @@ def _coefficients(text: str | None) -> dict[str, Any]:
         numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         numbers = []
+    if len(numbers) == len(LENS_PARAMETERS["thin_prism"]):
+        return {"model": "thin_prism", "lens": tuple(numbers)}
     if len(numbers) not in (4, 5, 8):
         raise SettingsError(
-            f"--distortion is '{text}'; give four, five or eight numbers "
-            "k1,k2,p1,p2[,k3[,k4,k5,k6]] like 0.1,-0.2,0,0"
+            f"--distortion is '{text}'; give four, five, eight or twelve numbers "
+            "k1,k2,p1,p2[,k3[,k4,k5,k6[,s1,s2,s3,s4]]] like 0.1,-0.2,0,0"
         )
     return dict(zip(DISTORTION_FIELDS, numbers, strict=False))
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fisheye models of settings: their names, their parameters, and the names of other programs."""
+"""Lens models of settings beyond the pinhole: names, parameters, and other programs' names.
+
+Fisheye models, and OpenCV's thin prism: their keypoints are pixels of the images as they come.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,11 @@ LENS_PARAMETERS: dict[str, tuple[str, ...]] = {
     "eucm": ("alpha", "beta"),
     "mei": ("xi", "k1", "k2", "p1", "p2"),
     "fov": ("omega",),
+    "thin_prism": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"),
 }
 #: Names of the parameters, and the parameters that only fisheye models have.
 ALL_PARAMETERS = tuple(dict.fromkeys(name for names in LENS_PARAMETERS.values() for name in names))
-FISHEYE_PARAMETERS = ("xi", "alpha", "beta", "omega")
+FISHEYE_PARAMETERS = ("xi", "alpha", "beta", "omega", "s1", "s2", "s3", "s4")
 
 #: ``Camera.type`` of settings files.
 TYPES = {
@@ -31,6 +35,7 @@ TYPES = {
     "eucm": "EUCM",
     "mei": "Mei",
     "fov": "FOV",
+    "thin_prism": "ThinPrism",
 }
 
 #: Names of other programs, without signs between words, in lower case.
@@ -43,6 +48,7 @@ _NAMES = {
     "eucm": "eucm extendedunified",
     "mei": "mei omni unifiedomnidirectional omniradtan",
     "fov": "fov pinholefov atan",
+    "thin_prism": "thinprism",
 }
 _MODELS = {name: model for model, names in _NAMES.items() for name in names.split()}
 

@@ -120,6 +120,11 @@ def _is_basalt(content: CalibrationText) -> bool:
     return isinstance(inner, dict) and "intrinsics" in inner
 
 
+def _is_woodscape(content: CalibrationText) -> bool:
+    inner = content.json.get("intrinsic")
+    return isinstance(inner, dict) and inner.get("model") == "radial_poly" and "cx_offset" in inner
+
+
 #: Keys that hold a whole camera matrix in files of nobody's format.
 MATRIX_KEYS = ("camera_matrix", "cameraMatrix", "intrinsic_matrix", "mtx", "K", "intrinsics")
 
@@ -294,6 +299,23 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "One camera of its models RadTan, KB, DS, EUCM and UCM.",
         _line(r"^image\s*:\s*$", r"^parameter\s*:\s*$"),
         "image:\n  width: 752\nparameter:\n  fx: 459.26",
+    ),
+    ForeignFormat(
+        "woodscape",
+        "a camera of WoodScape",
+        "WoodScape, JSON",
+        "One camera: the model of ours that comes closest to its polynomial is fitted.",
+        _is_woodscape,
+        '{"intrinsic": {"model": "radial_poly", "cx_offset": 3.9, ...}}',
+    ),
+    ForeignFormat(
+        "aria",
+        "a calibration of Project Aria",
+        "Project Aria, JSON",
+        "One camera: the model of ours that comes closest to FISHEYE624 is fitted. Needs --size.",
+        lambda content: content.has("CameraCalibrations"),
+        '{"CameraCalibrations": [{"Projection": {"Name": "FisheyeRadTanThinPrism", ...}}]}',
+        "file",
     ),
     ForeignFormat(
         "numbers",

@@ -56,13 +56,13 @@ class CameraSettings:
         Denominator of the rational distortion model; all 0 for the radial-tangential model.
     model
         ``pinhole``, or the name of a fisheye model of `orbslam2py.CameraModel`:
-        ``kannala_brandt``, ``double_sphere``, ``eucm``, ``mei`` or ``fov``. Other names of these
-        are replaced by them.
+        ``kannala_brandt``, ``double_sphere``, ``eucm``, ``mei`` or ``fov``; or ``thin_prism``.
+        Other names of these are replaced by them.
     lens
         Parameters of the fisheye model after fx, fy, cx, cy, in the order of
         `orbslam2py.CameraModel`; empty for ``pinhole``. ``kannala_brandt``: k1, k2, k3, k4;
         ``double_sphere``: xi, alpha; ``eucm``: alpha, beta; ``mei``: xi, k1, k2, p1, p2; ``fov``:
-        omega.
+        omega; ``thin_prism``: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
 
     Raises
     ------
@@ -316,7 +316,7 @@ class CameraRectification(MadeAgainByCopies):
     K
         Raw camera matrix (3, 3), pixels.
     D
-        Raw distortion, 4, 5 or 8 coefficients.
+        Raw distortion, 4, 5, 8 or 12 coefficients.
     R
         Rotation (3, 3) from raw to rectified camera coordinates.
     P
@@ -341,8 +341,8 @@ class CameraRectification(MadeAgainByCopies):
             object.__setattr__(self, name, value)
             if shape is not None and value.shape != shape:
                 problems.append(f"{name} must be {shape[0]} x {shape[1]}, not {value.shape}")
-            elif shape is None and value.size not in (4, 5, 8):
-                problems.append(f"{name} must have 4, 5 or 8 coefficients, not {value.size}")
+            elif shape is None and value.size not in (4, 5, 8, 12):
+                problems.append(f"{name} must have 4, 5, 8 or 12 coefficients, not {value.size}")
             elif not np.isfinite(value).all():
                 problems.append(f"{name} holds a number that is not finite")
             elif name in "KP":

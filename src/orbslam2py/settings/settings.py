@@ -259,7 +259,8 @@ def _lens_line(camera: CameraSettings) -> str:
     """Say what the lens is."""
     if camera.is_fisheye:
         named = zip(LENS_PARAMETERS[camera.model], camera.lens, strict=True)
-        return f"fisheye lens {camera.model}: {', '.join(f'{n} {value:g}' for n, value in named)}"
+        kind = "lens" if camera.model == "thin_prism" else "fisheye lens"
+        return f"{kind} {camera.model}: {', '.join(f'{n} {value:g}' for n, value in named)}"
     if not camera.is_distorted:
         return "no distortion"
     names = ", ".join(DISTORTION_FIELDS[: len(camera.distortion)])

@@ -37,7 +37,17 @@ def test_command_writes_settings_that_load(tmp_path: Path) -> None:
 def test_the_depth_factor_is_printed(tmp_path: Path) -> None:
     (tmp_path / "views").mkdir()
     views = chessboards.write_views(tmp_path / "views")
-    arguments = ["calibrate", str(views), "--board", "9x6", "--square", "0.025", "--max-views", "6"]
+    arguments = [
+        "calibrate",
+        str(views),
+        "--board",
+        "9x6",
+        "--square",
+        "0.025",
+        "--max-views",
+        "6",
+        "--k3",
+    ]
     arguments += ["--sensor", "rgbd", "--force", "--output", str(tmp_path / "my.yaml")]
     assumed = CliRunner().invoke(app, arguments)
     assert "1000 units per metre (millimetres) are assumed" in " ".join(assumed.output.split())

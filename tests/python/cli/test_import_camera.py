@@ -20,6 +20,7 @@ from support.foreign_cameras import BASELINE, CX, CY, FX, FY, D, kalibr_pair
 
 IMPORT = ("import-camera", "file", "--output", "my.yaml")
 THIN_PRISM = files.ROS1.replace(str(list(D)), str([*files.RATIONAL, 0.01, 0.02, 0.03, 0.04]))
+TILTED = files.ROS1.replace(str(list(D)), str([*files.RATIONAL, 0.01, 0, 0, 0, 0.002, 0.001]))
 OTHER_LENSES = {
     "thin prism": ("1 THIN_PRISM_FISHEYE 640 480 300 300 320 240\n", "thin prism"),
     "polynomial": ('{"intrinsic": {"model": "radial_poly", "k1": 339.7}}', "polynomial"),
@@ -184,10 +185,23 @@ def test_other_lenses(command: CommandLine, tmp_path: Path, name: str) -> None:
     assert "--fx" not in message
 
 
-def test_thin_prism_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path) -> None:
+def test_thin_prism_is_read(command: CommandLine, tmp_path: Path) -> None:
     written(tmp_path, THIN_PRISM, "file")
+    done = command(*IMPORT)
+    assert done.code == 0
+    assert "lens thin_prism: k1" in done.out
+    camera = Settings.load("my.yaml", "mono").camera
+    assert (camera.model, camera.lens) == (
+        "thin_prism",
+        (*files.RATIONAL, 0.01, 0.02, 0.03, 0.04),
+    )
+    assert command("settings", "show", "my.yaml").code == 0
+
+
+def test_a_tilted_sensor_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, TILTED, "file")
     message = refused(command(*IMPORT))
-    assert "12 coefficients (thin prism or tilted model)" in message
+    assert "14 coefficients (a tilted sensor)" in message
     assert "cv2.undistort with K and D" in message
     assert command(*line_in(message)).code == 0
     assert numbers_of("my.yaml") == (FX, FY, CX, CY), "cv2.undistort keeps the camera matrix"

@@ -308,7 +308,7 @@ WRONG: dict[str, str] = {
     "zero.yaml": ROS1.replace(str(ROWS), str([0.0] * 9)),
     "roi.yaml": ROS1.replace("x_offset: 0", "x_offset: 700"),
     "seven.yaml": ROS1.replace(str(list(D)), str([0.1] * 7)),
-    "prism.yaml": ROS1.replace(str(list(D)), str([0.1] * 12)),
+    "prism.yaml": ROS1.replace(str(list(D)), str([0.1] * 14)),
     "words.txt": OST.replace("distortion\n", "distortion\nnone of it\n"),
     "half.txt": OST.partition("distortion")[0],
     "mei.yaml": "model_type: MEI\nimage_width: 640\nimage_height: 480\n",

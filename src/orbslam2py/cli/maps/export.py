@@ -36,6 +36,7 @@ from orbslam2py.maps import (
     with_colours,
 )
 from orbslam2py.maps.edits.parts import take_map
+from orbslam2py.maps.exports.pinhole_views import checked_field
 from orbslam2py.trajectory import Trajectory
 
 
@@ -103,6 +104,14 @@ def export(
     without_images: Annotated[
         bool, typer.Option("--without-images", help="Use no images, also if the map file has some.")
     ] = False,
+    field: Annotated[
+        float | None,
+        typer.Option(
+            help="Fisheye lens, colmap and nerfstudio: write pinhole images with this angle of "
+            "view in the longer direction [degrees; only if the format cannot hold the lens: the "
+            "widest without empty borders]."
+        ),
+    ] = None,
     frames: Annotated[
         bool,
         typer.Option(
@@ -117,6 +126,7 @@ def export(
     _refuse_what_does_nothing(file_format, images, fps, times, without_images, frames)
     if split and images is None:
         raise DatasetError("--split says what --images hold; give these as well")
+    _check_field(file_format, field, without_images)
     log_to(Console(stderr=True), quiet=quiet)
     saved = take_map(load_map(file, images=images is None and not without_images), number)
     if file_format not in _FOLDERS:
@@ -125,7 +135,7 @@ def export(
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     source = None if without_images else _image_source(saved, images, fps, times, split)
     with _progress(console) as bar:
-        _write(saved, file_format, output, source, bar, frames=frames, force=force)
+        _write(saved, file_format, output, source, bar, frames=frames, force=force, field=field)
     console.print(f"{_what(saved, file_format)} is in [bold]{escape(str(output))}[/]")
     if source is None and file_format in _FOLDERS:
         console.print("No images are beside it: give the sequence with --images to train on it.")
@@ -149,6 +159,15 @@ def _refuse_what_does_nothing(
     for name, value in (("--fps", fps), ("--times", times)):
         if value is not None and images is None:
             raise DatasetError(f"{name} says when --images were taken; give these as well")
+
+
+def _check_field(file_format: ExportFormat, field: float | None, without_images: bool) -> None:
+    if field is None:
+        return
+    if file_format not in _FOLDERS or without_images:
+        what = "--without-images" if without_images else str(file_format)
+        raise DatasetError(f"--field is of the images, and {what} writes none; leave it out")
+    checked_field(field)
 
 
 def _image_source(
@@ -176,6 +195,7 @@ def _write(
     *,
     frames: bool,
     force: bool,
+    field: float | None,
 ) -> None:
     contents = saved.contents
     task = bar.add_task("images", total=len(contents.keyframes), visible=images is not None)
@@ -184,10 +204,20 @@ def _write(
         bar.update(task, completed=done, total=total)
 
     if file_format is ExportFormat.NERFSTUDIO:
-        export_nerfstudio(contents, output, images=images, replace=force, progress=show)
+        export_nerfstudio(
+            contents, output, images=images, replace=force, progress=show, field=field
+        )
     elif file_format in _FOLDERS:
         binary = file_format is ExportFormat.COLMAP
-        export_colmap(contents, output, images=images, binary=binary, replace=force, progress=show)
+        export_colmap(
+            contents,
+            output,
+            images=images,
+            binary=binary,
+            replace=force,
+            progress=show,
+            field=field,
+        )
     elif file_format in _POINTS:
         coloured = contents if images is None else with_colours(contents, images)
         export_points(coloured, output, str(file_format))

@@ -102,6 +102,11 @@ class CameraInfo:
         """Whether raw images are those of an equidistant (Kannala-Brandt) lens."""
         return self.model in _FISHEYES
 
+    @property
+    def is_thin_prism(self) -> bool:
+        """Whether D has s1 to s4 of OpenCV's thin prism model and no tilt of the sensor."""
+        return bool(self.model in _MODELS and self.D[8:12].any() and not self.D[12:].any())
+
     def fisheye_lens(self) -> tuple[float, ...]:
         """Return k1, k2, k3, k4 of an equidistant lens.
 
@@ -173,6 +178,8 @@ def settings_of_camera(
     lens: dict[str, Any] = {}
     if not rectified and info.is_fisheye:
         lens = {"model": "kannala_brandt", "lens": info.fisheye_lens()}
+    elif not rectified and info.is_thin_prism:
+        lens = {"model": "thin_prism", "lens": tuple(info.D[:12].tolist())}
     elif not rectified:
         lens = dict(zip(_COEFFICIENTS, info.distortion().tolist(), strict=True))
     try:

@@ -14,6 +14,7 @@ from orbslam2py._files import atomic_write
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.exports.colmap_model import (
+    COLMAP_LENSES,
     MODEL_IDS,
     ColmapCamera,
     ColmapImage,
@@ -34,6 +35,7 @@ def export_colmap(
     binary: bool = True,
     replace: bool = False,
     progress: Progress | None = None,
+    field: float | None = None,
 ) -> None:
     """Write a map as a model of COLMAP: ``sparse/0`` and, if they are given, ``images``.
 
@@ -52,7 +54,8 @@ def export_colmap(
         distortion, for cameras of the model ``PINHOLE``; keyframes without one are left out.
         Without `images` none are written, and the cameras are those that took them: ``PINHOLE``,
         ``OPENCV`` (k1, k2, p1, p2) or ``FULL_OPENCV`` (k3 as well). Fisheye cameras are
-        ``OPENCV_FISHEYE`` (Kannala-Brandt) or ``FOV`` in either case.
+        ``OPENCV_FISHEYE`` (Kannala-Brandt) or ``FOV`` in either case; the `images` of other models
+        become those of a pinhole.
     image_names
         Names for images that are elsewhere, by keyframe id, where `images` is not given; keyframes
         without one are left out. By default ``keyframe_000012.png`` and so on. Names with spaces
@@ -63,6 +66,11 @@ def export_colmap(
         Replace an earlier export.
     progress
         ``progress(done, total)`` after every image.
+    field
+        Fisheye cameras: write `images` as a pinhole sees them, with this angle of view in the
+        longer direction [degrees]. By default models that COLMAP has stay as they are, and images
+        of other models show the widest view without empty borders, at most 120 degrees. Keypoints
+        beside that view are at (0, 0) and belong to no point.
 
     Raises
     ------
@@ -87,7 +95,9 @@ def export_colmap(
             if not binary:
                 _check_names(contents, views)
         else:
-            views, contents = write_images(contents, made / "images", images, progress)
+            views, contents = write_images(
+                contents, made / "images", images, progress, held=COLMAP_LENSES, field=field
+            )
         sparse = made / "sparse" / "0"
         sparse.mkdir(parents=True)
         model = colmap_model(contents, views)

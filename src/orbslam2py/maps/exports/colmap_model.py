@@ -25,6 +25,9 @@ from orbslam2py.maps.reprojection import project_points
 #: Numbers of the camera models and of the parameters each has.
 MODEL_IDS = {"PINHOLE": 1, "OPENCV": 4, "OPENCV_FISHEYE": 5, "FULL_OPENCV": 6, "FOV": 7}
 
+#: Fisheye models that COLMAP has, by our names.
+COLMAP_LENSES = ("kannala_brandt", "fov")
+
 #: Of points without a colour.
 _GREY = 128
 
@@ -142,8 +145,14 @@ def _sightings(contents: MapContents, views: list[View]) -> tuple[IntArray, Floa
     point = np.searchsorted(contents.points.ids, observations.point[seen])
     expected = project_points(contents, seer, point, bent[seer])
     expected = (expected + 0.5) * scales[seer]
+    for view in views:
+        if view.pinhole is not None:
+            part, own = keyframes.keypoints_of(view.row), seer == view.row
+            xy[part] = view.pinhole.pixels_of(xy[part] - 0.5) + 0.5
+            expected[own] = view.pinhole.pixels_of(expected[own] - 0.5) + 0.5
     error = np.linalg.norm(expected - xy[contents.observed_keypoints[seen]], axis=1)
-    return seen, xy, error
+    inside = np.isfinite(error)
+    return seen[inside], np.nan_to_num(xy), error[inside]
 
 
 def _camera(
@@ -156,8 +165,11 @@ def _camera(
         sx * (cameras.cx[row] + 0.5),
         sy * (cameras.cy[row] + 0.5),
     ]
+    if view.pinhole is not None:
+        fx, fy, cx, cy = view.pinhole.intrinsics
+        pinhole = [fx, fy, cx + 0.5, cy + 0.5]
     lens = cameras.distortion[row].tolist()
-    fisheye = cameras.camera_model(row)
+    fisheye = None if view.pinhole is not None else cameras.camera_model(row)
     if fisheye is not None:
         model, own = fisheye_of(fisheye, "COLMAP's model", {"fov": "FOV"})
         parameters = [sx * own[0], sy * own[1], *pinhole[2:], *own[4:]]

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import logging
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import cv2
@@ -23,6 +24,14 @@ from orbslam2py.maps.exports.images import (
     image_name,
     image_of_row,
 )
+from orbslam2py.maps.exports.pinhole_views import (
+    PinholeView,
+    checked_field,
+    pinhole_view,
+    scaled_camera,
+)
+
+_log = logging.getLogger(__name__)
 
 
 @contextlib.contextmanager
@@ -64,13 +73,20 @@ def export_folder(folder: str | Path, made_of: set[str], *, replace: bool) -> It
 
 
 def write_images(
-    contents: MapContents, folder: Path, images: ImageOfKeyframe, progress: Progress | None = None
+    contents: MapContents,
+    folder: Path,
+    images: ImageOfKeyframe,
+    progress: Progress | None = None,
+    *,
+    held: Collection[str] = (),
+    field: float | None = None,
 ) -> tuple[list[View], MapContents]:
     """Write the keyframes' images as PNG files, as a pinhole camera would see them.
 
-    Those of fisheye cameras stay as they are. Of others the camera keeps its matrix; what a lens
-    bends out of the image is cut off, and where it bends in nothing, the image is black. Images of
-    another size than the camera's (small copies) are taken for scaled ones.
+    Those of fisheye cameras that the format can hold stay as they are; of others a pinhole view is
+    cut out. Of pinhole cameras the camera keeps its matrix; what a lens bends out of the image is
+    cut off, and where it bends in nothing, the image is black. Images of another size than the
+    camera's (small copies) are taken for scaled ones.
 
     Parameters
     ----------
@@ -82,6 +98,11 @@ def write_images(
         Where they come from; keyframes without one are left out.
     progress
         Called after every keyframe.
+    held
+        Names of the fisheye models that the format can hold.
+    field
+        Angle of view of the pinhole views in the longer direction [degrees], also of the models
+        that the format can hold. None: the widest without empty borders, at most 120 degrees.
 
     Returns
     -------
@@ -100,6 +121,7 @@ def write_images(
         If one cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    pinholes = _PinholesOfFisheyes(contents, held, field)
     views = []
     sampler = ColourSampler(contents)
     ids = contents.keyframes.ids.tolist()
@@ -107,11 +129,15 @@ def write_images(
         image = image_of_row(contents, row, images)
         if image is not None:
             sampler.look_at(row, image)
-            straight = _undistorted(contents, row, image)
-            _write_png(folder / image_name(number), straight)
             height, width = image.shape[:2]
+            pinhole = pinholes.of(row, width, height)
+            straight = (
+                _undistorted(contents, row, image) if pinhole is None else pinhole.render(image)
+            )
+            _write_png(folder / image_name(number), straight)
             fisheye = contents.cameras.model[contents.keyframes.camera[row]] != 0
-            views.append(View(row, image_name(number), width, height, undistorted=not fisheye))
+            undistorted = pinhole is not None or not fisheye
+            views.append(View(row, image_name(number), width, height, undistorted, pinhole))
         if progress is not None:
             progress(row + 1, len(ids))
     if not views:
@@ -120,6 +146,37 @@ def write_images(
             "images out"
         )
     return views, sampler.coloured()
+
+
+class _PinholesOfFisheyes:
+    """Pinhole views of the fisheye cameras that a format cannot hold, made once and told once."""
+
+    def __init__(self, contents: MapContents, held: Collection[str], field: float | None) -> None:
+        self._contents, self._held = contents, held
+        self._field = None if field is None else checked_field(field)
+        self._views: dict[tuple[int, int, int], PinholeView] = {}
+
+    def of(self, row: int, width: int, height: int) -> PinholeView | None:
+        """The view for the image of a keyframe; None if its camera needs none."""
+        number = int(self._contents.keyframes.camera[row])
+        model = self._contents.cameras.camera_model(number)
+        if model is None or (self._field is None and model.name in self._held):
+            return None
+        key = number, width, height
+        if key not in self._views:
+            view = pinhole_view(scaled_camera(model, width, height), self._field)
+            self._views[key] = view
+            wide, high = view.field
+            why = "" if model.name in self._held else ", which the format cannot hold"
+            _log.warning(
+                "the camera has a lens of the model %s%s: the images are written as a pinhole "
+                "sees them, %.0f x %.0f degrees (--field sets the longer angle)",
+                model.name,
+                why,
+                wide,
+                high,
+            )
+        return self._views[key]
 
 
 def _undistorted(contents: MapContents, row: int, image: ByteArray) -> ByteArray:

@@ -14,6 +14,7 @@ from orbslam2py._arguments import instance_of, path_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import DatasetError, ImageError, MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.exports.pinhole_views import PinholeView
 from orbslam2py.settings import CameraModel, Settings
 from orbslam2py.trajectory import associate
 
@@ -170,6 +171,8 @@ class View:
     height: int
     undistorted: bool
     """The image shows what a pinhole camera sees; otherwise the lens distorts it."""
+    pinhole: PinholeView | None = None
+    """The pinhole, if it is another one than the camera's own without its distortion."""
 
 
 def fisheye_of(
@@ -195,8 +198,8 @@ def fisheye_of(
     if model.name not in names:
         raise DatasetError(
             f"{format_name} cannot hold a lens of the model {model.name}, only "
-            f"{', '.join(names)}; make the map with settings of such a model (Kalibr calibrates "
-            "one as pinhole-equi), or export points and trajectory (ply, pcd, tum)"
+            f"{', '.join(names)}; give the images (--images, images=...), which are written as a "
+            "pinhole camera sees them, or export points and trajectory (ply, pcd, tum)"
         )
     return names[model.name], model.parameters
 

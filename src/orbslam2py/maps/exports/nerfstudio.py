@@ -45,6 +45,7 @@ def export_nerfstudio(
     image_names: Mapping[int, str | Path] | None = None,
     replace: bool = False,
     progress: Progress | None = None,
+    field: float | None = None,
 ) -> None:
     """Write a map as ``transforms.json`` with its points in ``sparse_pc.ply``, and ``images``.
 
@@ -70,6 +71,11 @@ def export_nerfstudio(
         Replace an earlier export.
     progress
         ``progress(done, total)`` after every image.
+    field
+        Fisheye cameras: write `images` as a pinhole sees them, with this angle of view in the
+        longer direction [degrees]. By default Kannala-Brandt lenses (``OPENCV_FISHEYE``) stay as
+        they are, and images of other models show the widest view without empty borders, at most
+        120 degrees.
 
     Raises
     ------
@@ -92,7 +98,9 @@ def export_nerfstudio(
             if not views:
                 raise DatasetError("image_names names no keyframe of the map; give its keyframes")
         else:
-            views, contents = write_images(contents, made / "images", images, progress)
+            views, contents = write_images(
+                contents, made / "images", images, progress, held=("kannala_brandt",), field=field
+            )
             below = "images/"
         with atomic_write(made / "transforms.json") as stream:
             stream.write(json.dumps(_transforms(contents, views, below), indent=2) + "\n")
@@ -136,6 +144,11 @@ def _camera(contents: MapContents, view: View) -> dict[str, float | str]:
     cameras: Cameras = contents.cameras
     row = int(contents.keyframes.camera[view.row])
     sx, sy = pixel_scale(contents, view)
+    if view.pinhole is not None:
+        fx, fy, cx, cy = view.pinhole.intrinsics
+        names = ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
+        numbers = (fx, fy, cx + 0.5, cy + 0.5, *[0.0] * 5)
+        return {"w": view.width, "h": view.height, **dict(zip(names, numbers, strict=True))}
     fisheye = cameras.camera_model(row)
     if fisheye is not None:
         name, own = fisheye_of(fisheye, "nerfstudio's transforms.json", {})

@@ -101,7 +101,10 @@ def test_calibration_given_to_run(command: CommandLine, tmp_path: Path, sensor: 
 @pytest.mark.parametrize(
     ("more", "messages"),
     [
-        (("--sensor", "stereo"), ("a pair needs both together", "orbslam2py import-camera")),
+        (
+            ("--sensor", "stereo"),
+            ("needs the images of both cameras", "give two folders or videos"),
+        ),
         (("--baseline", "0.1"), ("leave it out for mono",)),
         (("--sensor", "rgbd", "--depth-factor", "-1"), ("DepthMapFactor is -1", "1000 for")),
     ],

@@ -143,6 +143,11 @@ def test_eight_coefficients(tmp_path: Path) -> None:
 
 
 def test_more_coefficients(tmp_path: Path) -> None:
+    twelve = (*D, 0.1, 0.02, 0.003, 1e-3, 2e-3, 0.0, 4e-3)
+    info = {**raw_pair()["left"], "D": twelve, "model": "rational_polynomial"}
+    bag = bags.write(tmp_path / "a", "mcap", messages("image_raw", {"camera": info}))
+    camera = BagSequence(bag).settings.camera
+    assert (camera.model, camera.lens) == ("thin_prism", twelve)
     info = {**raw_pair()["left"], "D": (*D, *[0.1] * 9), "model": "rational_polynomial"}
     bag = bags.write(tmp_path / "b", "mcap", messages("image_raw", {"camera": info}))
     with pytest.raises(orb.DatasetError, match="14 coefficients is not supported, at most 8 are"):

@@ -18,6 +18,7 @@ from orbslam2py import CameraModel, DatasetError, MapFileError
 from orbslam2py._arrays import ByteArray
 from orbslam2py.maps import MapContents, export_colmap
 from orbslam2py.maps.content_groups import LENS_SIZE, model_number_of
+from orbslam2py.maps.reprojection import project_points
 from support.made_up_map import (
     BF,
     CX,
@@ -308,8 +309,54 @@ def test_a_fisheye_camera_keeps_its_model(tmp_path: Path) -> None:
     np.testing.assert_allclose(camera.img_from_cam(point), ours[0] + 0.5, atol=1e-6)
 
 
+def seen_through(contents: MapContents) -> MapContents:
+    """The map with the observed keypoints where the cameras show the points."""
+    observations, keypoints = contents.observations, contents.keyframes.keypoints.copy()
+    seer = np.searchsorted(contents.keyframes.ids, observations.keyframe)
+    point = np.searchsorted(contents.points.ids, observations.point)
+    flat = np.zeros(len(seer), bool)
+    keypoints[contents.observed_keypoints] = project_points(contents, seer, point, flat)
+    return replace(contents, keyframes=replace(contents.keyframes, keypoints=keypoints))
+
+
+@pytest.mark.parametrize("field", [None, 40.0])
+def test_images_of_another_lens_become_those_of_a_pinhole(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, field: float | None
+) -> None:
+    contents = seen_through(fisheye_map("double_sphere", (-0.2, 0.6)))
+    white = np.full((HEIGHT, WIDTH), 255, np.uint8)
+    export_colmap(contents, tmp_path / "out", images=lambda _: white, field=field)
+    assert "lens of the model double_sphere, which the format cannot hold" in caplog.text
+    model = read(tmp_path / "out")
+    camera = model.cameras[1]
+    assert (camera.model.name, camera.width, camera.height) == ("PINHOLE", WIDTH, HEIGHT)
+    wide = np.degrees(2 * np.arctan(WIDTH / 2 / camera.params[0]))
+    assert 10 < wide <= 120
+    if field is not None:
+        assert wide == pytest.approx(40)
+    n_points = 0
+    for image in model.images.values():
+        picture = cv2.imread(str(tmp_path / "out" / "images" / image.name), cv2.IMREAD_GRAYSCALE)
+        assert picture is not None
+        if field is None:
+            assert picture.min() > 250, "no border is empty"
+        for keypoint in image.points2D:
+            if keypoint.has_point3D():
+                n_points += 1
+                position = model.points3D[keypoint.point3D_id].xyz
+                expected = camera.img_from_cam(image.cam_from_world() * position)
+                np.testing.assert_allclose(keypoint.xy, expected, atol=5e-3)
+    assert n_points > 10
+
+
+def test_the_field_of_the_images_is_checked(tmp_path: Path) -> None:
+    contents = fisheye_map("double_sphere", (-0.2, 0.6))
+    with pytest.raises(DatasetError, match="field of view of the images is 200; give degrees from"):
+        export_colmap(contents, tmp_path / "out", images=lambda _: None, field=200.0)
+
+
 def test_a_lens_that_colmap_does_not_know(tmp_path: Path) -> None:
     contents = fisheye_map("double_sphere", (-0.2, 0.6))
-    with pytest.raises(DatasetError, match=r"double_sphere.*kannala_brandt"):
+    with pytest.raises(DatasetError, match=r"double_sphere.*kannala_brandt.*give the images"):
         export_colmap(contents, tmp_path / "colmap")
     assert not (tmp_path / "colmap").exists()
