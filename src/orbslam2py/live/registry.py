@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Kinds of live sources by the prefix of their names."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import cast
+
+from orbslam2py.errors import DatasetError
+from orbslam2py.live.device import Device, FoundDevice, Request
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of live source.
+
+    Attributes
+    ----------
+    prefix
+        What its names begin with, without the colon.
+    example
+        A name as users write it.
+    what
+        What it is, a few words.
+    module
+        Module with ``open_device(request)``, which makes a `Device` (not started), and
+        ``find_devices()``, which lists those that are plugged in. It is loaded on first use and
+        may raise `ModuleNotFoundError` for a package that is not installed.
+    extra
+        Extra of the package that installs what the module needs; None if it needs nothing.
+    """
+
+    prefix: str
+    example: str
+    what: str
+    module: str
+    extra: str | None = None
+
+    def open(self, request: Request) -> Device:
+        """Make a device, without starting it.
+
+        Raises
+        ------
+        DatasetError
+            If its package is not installed, or there is no such device, with the remedy.
+        """
+        opener = cast(Callable[[Request], Device], self._load("open_device"))
+        return opener(request)
+
+    def find(self) -> list[FoundDevice]:
+        """List the devices that are plugged in.
+
+        Raises
+        ------
+        DatasetError
+            If its package is not installed, or cannot look.
+        """
+        return cast(Callable[[], list[FoundDevice]], self._load("find_devices"))()
+
+    def _load(self, name: str) -> object:
+        try:
+            return getattr(importlib.import_module(self.module), name)
+        except ImportError as error:
+            raise DatasetError(self._missing(error)) from error
+
+    def _missing(self, error: ImportError) -> str:
+        package = error.name or str(error)
+        if self.extra is None:
+            return f"{self.prefix}: cannot be used: {error}"
+        return (
+            f"{self.prefix}: needs the package {package}, which is not installed; install it: "
+            f'pip install "orbslam2py[{self.extra}]"'
+        )
+
+
+#: A new kind is one entry here.
+KINDS: tuple[Kind, ...] = ()
+
+
+def kind_of(source: str) -> tuple[Kind, str] | None:
+    """Split the name of a live source into its kind and the address; None if it is none."""
+    for kind in KINDS:
+        if source.startswith(f"{kind.prefix}:"):
+            is_url = source.startswith(f"{kind.prefix}://")
+            return kind, source if is_url else source[len(kind.prefix) + 1 :]
+    return None
