@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, Sensor, run_sequence
-from orbslam2py.datasets import LiveFrame, open_recorded
+from orbslam2py.datasets import LiveFrame, imu_of, open_recorded
 from orbslam2py.evaluation import evaluate_trajectory
 from orbslam2py.live import LiveStream, Request, open_source
 from orbslam2py.runs import RunOptions
@@ -240,18 +240,24 @@ def test_messages_of_the_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_own_recordings_are_read(tmp_path: Path) -> None:
     """A recording of the SDK itself, read by our reader of bags."""
-    sequence = sequence_of(Sensor.STEREO)
+    sequence = sequence_of(Sensor.STEREO, imu=True)
     made = made_of(sequence)
     path = tmp_path / "recorded.db3"
     recorder = rs.recorder(str(path), made.device)
-    sensor = recorder.query_sensors()[0]
-    sensor.open([p for p in sensor.get_stream_profiles() if "Infrared" in str(p)])
-    sensor.start(lambda frame: None)
-    played(made, sequence, 0.01).join()
+    wanted = ("Infrared", "Gyro", "Accel")
+    sensors = []
+    for sensor in recorder.query_sensors():
+        profiles = [p for p in sensor.get_stream_profiles() if p.stream_name()[:5] in str(wanted)]
+        if profiles:
+            sensor.open(profiles)
+            sensor.start(lambda frame: None)
+            sensors.append(sensor)
+    played(made, sequence, 0.02).join()
     time.sleep(0.3)
-    sensor.stop()
-    sensor.close()
-    del sensor, recorder
+    for sensor in sensors:
+        sensor.stop()
+        sensor.close()
+    del sensor, sensors, recorder
     opened = open_recorded(path, "stereo")
     assert len(opened) == N
     np.testing.assert_allclose(np.diff(opened.timestamps), np.diff(sequence.timestamps), atol=1e-6)
@@ -259,3 +265,10 @@ def test_own_recordings_are_read(tmp_path: Path) -> None:
     for k in (0, N - 1):
         np.testing.assert_array_equal(opened.load(k).image, sequence.load(k).image)
         np.testing.assert_array_equal(opened.load(k).right, sequence.load(k).right)
+    # Samples by the clock of the images, not by their times of arrival.
+    read, truth = imu_of(opened), sequence.imu()
+    assert read is not None and truth is not None
+    since = read.timestamps - opened.timestamps[0] + sequence.timestamps[0]
+    for column in (1, 3, 4, 6):
+        expected = np.interp(since, truth.timestamps, truth.data[:, column])
+        np.testing.assert_allclose(read.data[:, column], expected, atol=2e-4)
