@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 import secrets
@@ -39,7 +38,7 @@ from orbslam2py.ros.transport import (
     domain_of,
     is_local_only,
 )
-from orbslam2py.ros.types import dds_name, is_known, ros_name, type_hash
+from orbslam2py.ros.types import is_known, ros_name, type_hash
 
 _log = logging.getLogger(__name__)
 

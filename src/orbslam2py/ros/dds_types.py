@@ -69,4 +69,4 @@ def _member(described: Any) -> Any:
     if how.name == "ARRAY":
         return dds.array[_member(element), count]  # type: ignore[misc]
     of = _member(element)
-    return dds.sequence[of, count] if count else dds.sequence[of]  # type: ignore[valid-type,misc]
+    return dds.sequence[of, count] if count else dds.sequence[of]  # type: ignore[misc]

@@ -6,6 +6,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+from orbslam2py.datasets.bags.messages import read_message
 from orbslam2py.errors import DatasetError
 
 #: The typestore of the definitions. Types that are used here are the same from Humble to Kilted.
@@ -93,8 +94,6 @@ def from_cdr(content: bytes, kind: str) -> Any:
     DatasetError
         If it is damaged.
     """
-    from orbslam2py.datasets.bags.messages import read_message  # noqa: PLC0415
-
     return read_message(content, kind, "cdr")
 
 

@@ -84,9 +84,7 @@ class ZenohTransport:
     def topics(self) -> list[LiveTopic]:
         """List the topics that others publish now, by name."""
         found: dict[str, LiveTopic] = {}
-        replies = self._session.liveliness().get(
-            f"{_TOKENS}/{self.domain}/**", timeout=_LISTING
-        )
+        replies = self._session.liveliness().get(f"{_TOKENS}/{self.domain}/**", timeout=_LISTING)
         for reply in replies:
             if reply.ok is None:
                 continue
