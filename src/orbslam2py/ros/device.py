@@ -17,7 +17,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.bags.bag import Topic
 from orbslam2py.datasets.bags.depth_cameras import find_depth_camera
 from orbslam2py.datasets.bags.image_topics import ImageTopic
-from orbslam2py.datasets.bags.messages import HEAD_SIZE, IMU, read_head, stamp_of
+from orbslam2py.datasets.bags.messages import HEAD_SIZE, IMU, TRANSFORMS, read_head, stamp_of
 from orbslam2py.datasets.bags.pixels import decode_depth, decode_pixels
 from orbslam2py.datasets.bags.settings_of_topics import settings_of_topics
 from orbslam2py.datasets.bags.topics import TopicChoice, parse_topics
@@ -103,6 +103,30 @@ class TopicsDevice:
     def between(self, target: str, source: str) -> FloatArray | None:
         """Return ``T_target_source`` (4, 4) [m] by the static transforms; None if unknown."""
         return self._transforms.between((target.strip("/"),), (source.strip("/"),))
+
+    def parent_of(self, frame: str) -> str | None:
+        """Return the frame that TF has above a frame; None if there is none."""
+        bag = self._gathered.bag
+        for topic in bag.topics:
+            if topic.kind not in TRANSFORMS:
+                continue
+            for message in bag.messages(topic):
+                for one in from_cdr(bag.read(message), topic.kind).transforms:
+                    if one.child_frame_id.strip("/") == frame.strip("/"):
+                        return str(one.header.frame_id).strip("/")
+        return None
+
+    def root_of(self, frame: str) -> tuple[str, FloatArray]:
+        """Return the highest frame that TF has rigidly above a frame, and ``T_root_frame``."""
+        root, T = frame.strip("/"), np.eye(4)
+        seen = {root}
+        while (parent := self.parent_of(root)) is not None and parent not in seen:
+            found = self.between(parent, frame)
+            if found is None:
+                break
+            root, T = parent, found
+            seen.add(root)
+        return root, T
 
     def settings(self) -> Settings | None:
         """Make settings of the CameraInfo; see `Device.settings`."""
