@@ -13,6 +13,7 @@ from .errors import SettingsError as SettingsError
 from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
+from .live import open_source as open_source
 from .maps import MapSnapshot as MapSnapshot
 from .maps import export_colmap as export_colmap
 from .maps import export_g2o as export_g2o

@@ -20,8 +20,8 @@ from orbslam2py.batches.job import Job
 from orbslam2py.batches.remote import here
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.sweep import with_parameters
-from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError, OrbSlamError
+from orbslam2py.live import open_source
 from orbslam2py.runs.report import error_entry, peak_memory_mb
 from orbslam2py.runs.run import run_sequence
 
@@ -115,12 +115,12 @@ def _run(job: Job, path: Path, folder: Path, row: dict[str, Any], *, page: bool)
             f"{job.path} does not exist on {platform.node()}; put the sequences where all "
             "workers see them"
         )
-    sequence = open_input(path, job.sensor, settings=job.settings, topics=job.topics)
+    sequence = open_source(path, job.sensor, settings=job.settings, topics=job.topics)
     if not hasattr(sequence, "timestamps"):
         raise DatasetError(f"{job.path} is a camera; a batch runs recorded sequences")
     if job.parameters:
         changed = with_parameters(sequence.settings, job.parameters)
-        sequence = open_input(path, job.sensor, settings=changed, topics=job.topics)
+        sequence = open_source(path, job.sensor, settings=changed, topics=job.topics)
     row["sensor"] = str(sequence.sensor)
     options = job.run_options(sequence.sensor)
     done = run_sequence(

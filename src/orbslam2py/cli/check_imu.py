@@ -32,10 +32,10 @@ from orbslam2py.datasets import (
     GyroUnit,
     IterableSequence,
     imu_of,
-    open_input,
     read_imu_csv,
 )
 from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.live import open_source
 from orbslam2py.settings import ImuSettings, Sensor, imu_noise, read_imu_settings
 from orbslam2py.settings.imu_files import has_imu_keys
 from orbslam2py.slam.system import System
@@ -117,7 +117,7 @@ def check(
         check_picture_name(plot, "--plot")
         check_apart({"--plot": plot}, [] if imu is None else [imu])
     check_target(plot, force=force)
-    images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, topics=topics)
+    images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, topics=topics)
     if not isinstance(images, FramesInOrder):
         raise DatasetError(
             f"{sequence} is a camera, whose IMU is not read; record it first, and check that"

@@ -50,8 +50,8 @@ from orbslam2py.cli.run_options import (
 from orbslam2py.cli.targets import check_apart, check_kept
 from orbslam2py.cli.viewing import ViewerExit, ViewerFlag, ViewerHost, ViewerOptions, ViewerPort
 from orbslam2py.cli.watching import RecordOption, VideoOption
-from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.live import open_source
 from orbslam2py.maps import MapFile
 from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.input_folders import check_not_among_images
@@ -147,7 +147,7 @@ def run(
         if sensor is not None:
             check_sensor(loaded, sensor)
         sensor, chosen = loaded.sensor, loaded.settings
-    images = open_input(
+    images = open_source(
         sequence,
         sensor,
         settings=chosen,

@@ -14,8 +14,8 @@ from rich.console import Console
 from orbslam2py._waiting import wait_for_event
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.viewing import ViewerHost, ViewerPort
-from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError
+from orbslam2py.live import open_source
 from orbslam2py.runs.feeds import is_sequence
 
 
@@ -57,7 +57,7 @@ def view(
     images = None
     if sequence is not None:
         chosen = str(folder / "settings.yaml")
-        opened = open_input(sequence, run.sensor, settings=chosen, split=split)
+        opened = open_source(sequence, run.sensor, settings=chosen, split=split)
         if not is_sequence(opened):
             raise DatasetError("--sequence names a camera, whose images are gone; name a recording")
         images = opened

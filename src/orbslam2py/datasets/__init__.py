@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images: TUM RGB-D, KITTI odometry, EuRoC, bags, folders of images, videos, cameras."""
+"""Images: TUM RGB-D, KITTI odometry, EuRoC, bags, folders of images, videos."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
 
 from orbslam2py.datasets.bags import BagSequence
 from orbslam2py.datasets.base import (
     Frame,
+    FrameTimes,
     Images,
     IterableSequence,
     Layout,
@@ -28,11 +34,10 @@ from orbslam2py.datasets.layouts import (
     ReplicaSequence,
     SevenScenesSequence,
 )
-from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
-from orbslam2py.datasets.open_input import open_input
 from orbslam2py.datasets.recognise import is_recording, open_sequence, recognise
 from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.recorded_input import open_recorded
 from orbslam2py.datasets.stereo_folders import StereoFolders
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
@@ -44,6 +49,7 @@ __all__ = [
     "DepthFolders",
     "EurocSequence",
     "Frame",
+    "FrameTimes",
     "FramesInOrder",
     "GyroUnit",
     "IclNuimSequence",
@@ -73,7 +79,18 @@ __all__ = [
     "imu_of",
     "is_recording",
     "open_input",
+    "open_recorded",
     "open_sequence",
     "read_imu_csv",
     "recognise",
 ]
+
+#: Names of this room that moved to `orbslam2py.live`, and what they are called there.
+_MOVED = {"LiveCamera": "LiveCamera", "open_input": "open_source"}
+
+
+def __getattr__(name: str) -> Any:
+    """Give the names that moved: what opens cameras is a room above this one."""
+    if name in _MOVED:
+        return getattr(importlib.import_module("orbslam2py.live"), _MOVED[name])
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -131,22 +131,58 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True)
-class LiveFrame:
+class FrameTimes:
+    """When a live frame passed its stages, seconds on the clock of ``time.monotonic()``.
+
+    Attributes
+    ----------
+    exposure
+        Middle of the exposure of the (left) image; None if the device does not tell it.
+    arrival
+        The first image of the frame came.
+    complete
+        The last image of the frame came.
+    taken
+        The reader took the frame from the queue.
+    ready
+        The images were rectified and converted.
+    """
+
+    exposure: float | None
+    arrival: float
+    complete: float
+    taken: float
+    ready: float
+
+
+@dataclass(frozen=True, eq=False)
+class LiveFrame(EqualByValue):
     """An image from a camera.
 
     Attributes
     ----------
     timestamp
-        Seconds since 1970 when it came; grows from image to image whatever the system's clock does.
+        Seconds since 1970 of the (left) image; grows from frame to frame whatever the clocks do.
     text
         The time stamp in decimal seconds.
     images
         The image, with its mask if there is one.
+    imu
+        Samples of the IMU since the frame before, up to the time of this one: rows
+        ``[t, gx, gy, gz, ax, ay, az]``, float64 (n, 7), seconds on the clock of `timestamp`,
+        rad/s, m/s^2. None if the source has no IMU.
+    stamp
+        Time of the (left) image on the clock of the device, seconds; None if it has no clock.
+    times
+        When the frame passed its stages, for the latency; None if the source does not tell it.
     """
 
     timestamp: float
     text: str
     images: Images
+    imu: FloatArray | None = None
+    stamp: float | None = None
+    times: FrameTimes | None = None
 
 
 class LiveSource(Source, Protocol):
@@ -155,7 +191,7 @@ class LiveSource(Source, Protocol):
     Attributes
     ----------
     n_dropped
-        Images so far that came while nobody had taken the one before, which was then lost.
+        Frames so far that were lost because nobody had taken them in time.
     """
 
     @property

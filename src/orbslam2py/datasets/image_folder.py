@@ -138,7 +138,6 @@ class ImageFolder(FramesInOrder, UnposedSource):
         for first in read_sample(self.paths[:1]):
             refuse_first_depth(self.paths[0], with_depth=False)
             self.check_size(first)
-            self._size_checked = True
 
     def __len__(self) -> int:
         return len(self.paths)

@@ -163,6 +163,8 @@ def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
 
 #: Attributes that not every sequence has: where its files are.
 _OF_SOME = frozenset({"path", "folder", "image_path"})
+#: Attributes that not every live source has: its device, IMU, losses, and whoever records it.
+_OF_LIVE = frozenset({"device", "has_imu", "imu_settings", "doubts", "counts", "set_tap"})
 
 
 class _Masked:
@@ -282,6 +284,11 @@ class MaskedCamera(_Masked):
             raise DatasetError(f"{path} is a folder; a camera takes a single mask file")
         super().__init__(camera, StaticMask(path))
         self._camera = camera
+
+    def __getattr__(self, name: str) -> Any:
+        if name in _OF_LIVE:
+            return getattr(self._camera, name)
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def n_dropped(self) -> int:

@@ -3,26 +3,20 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Images, Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
+from orbslam2py.datasets.preparation import Preparation
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
-from orbslam2py.errors import DatasetError, ImageError, SettingsError
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
-
-_log = logging.getLogger(__name__)
 
 
 class UnposedSource:
@@ -64,26 +58,17 @@ class UnposedSource:
         self._split = split
         self.sensor = _choose_sensor(what, sensor, split=split)
         if settings is None:
-            raise SettingsError(
-                f"no settings for {what}: nothing tells what camera it is from. Give --settings "
-                f"with a file or a built-in name ({', '.join(BUILTIN_NAMES)}). Make a file with "
-                "'orbslam2py settings new' from the numbers of the camera, with 'orbslam2py "
-                "calibrate' "
-                "from images of a chessboard, or with 'orbslam2py import-camera' from a "
-                "calibration "
-                "you have"
-            )
+            raise no_settings(what)
         self.settings: Settings = resolve_settings(settings, self.sensor)
         if fps is not None:
             self.settings = replace(self.settings, camera=with_rate(self.settings.camera, fps))
-        self._what = what
-        self._size_checked = False
+        self._preparation = Preparation(what, self.sensor, self.settings, split=split)
 
     def ground_truth(self) -> Trajectory | None:
         """Return None: there are no true poses."""
         return None
 
-    def _delivered(self, image: ByteArray) -> Images:
+    def _delivered(self, image: NDArray[np.generic]) -> Images:
         """Make what is tracked of OpenCV's image: halves, colour order, rectification.
 
         Raises
@@ -93,67 +78,22 @@ class UnposedSource:
         ImageError
             If it cannot be split.
         """
-        halves = self._halves(image)
-        if not self._size_checked:
-            self._size_checked = True
-            self.check_size(image)
-        if self.sensor is not Sensor.STEREO:
-            return Images(self._ordered(halves[0]))
-        left, right = map(self._ordered, halves)
-        if self._rectifiers is not None:
-            left = self._rectifiers[0].rectify(left, f"the left half of {self._what}")
-            right = self._rectifiers[1].rectify(right, f"the right half of {self._what}")
-        return Images(left, right=right)
-
-    def _halves(self, image: ByteArray) -> tuple[ByteArray, ...]:
-        if not self._split:
-            return (image,)
-        width = image.shape[1]
-        if width % 2:
-            raise ImageError(
-                f"{self._what} has an image {width} pixels wide: no two halves of equal width; "
-                "leave out --split if it does not hold two views side by side"
-            )
-        return image[:, : width // 2], image[:, width // 2 :]
-
-    def _ordered(self, image: ByteArray) -> ByteArray:
-        """Give OpenCV's image the colour order of the settings."""
-        if image.ndim == 3 and self.settings.camera.rgb:
-            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
-        return np.ascontiguousarray(image)
-
-    @cached_property
-    def _rectifiers(self) -> Rectifiers | None:
-        return rectifiers_of(self.settings)
+        return self._preparation.images({"image": image})
 
     def check_size(self, image: NDArray[np.generic]) -> None:
-        """Compare the size of an image as it is stored with the one of the settings.
+        """Compare the size of an image with the settings; see `Preparation.check_size`."""
+        self._preparation.check_size(image)
 
-        Raises
-        ------
-        DatasetError
-            If it is twice as wide: it holds two views. Other sizes are warned of.
-        """
-        camera = self.settings.camera
-        width = image.shape[1] // 2 if self._split else image.shape[1]
-        given, found = (camera.width, camera.height), (width, image.shape[0])
-        if camera.width is None or camera.height is None or given == found:
-            return
-        if found == (2 * camera.width, camera.height) and not self._split:
-            raise DatasetError(
-                f"{self._what} has images of {found[0]} x {found[1]} pixels, twice as wide as "
-                f"those of the settings ({given[0]} x {given[1]}): if they hold the left and the "
-                "right view side by side, take --split of 'orbslam2py run' (with --sensor mono for "
-                "the left one alone); else correct Camera.width in the settings"
-            )
-        _log.warning(
-            "%s has images of %d x %d pixels%s, but the settings are for %d x %d: "
-            "focal lengths and distortion do not fit",
-            self._what,
-            *found,
-            " in each half" if self._split else "",
-            *given,
-        )
+
+def no_settings(what: object) -> SettingsError:
+    """Say that nothing tells what camera images are from, and what to do about it."""
+    return SettingsError(
+        f"no settings for {what}: nothing tells what camera it is from. Give --settings "
+        f"with a file or a built-in name ({', '.join(BUILTIN_NAMES)}). Make a file with "
+        "'orbslam2py settings new' from the numbers of the camera, with 'orbslam2py "
+        "calibrate' from images of a chessboard, or with 'orbslam2py import-camera' from a "
+        "calibration you have"
+    )
 
 
 def _choose_sensor(what: str | Path, sensor: Sensor | str | None, *, split: bool) -> Sensor:

@@ -226,7 +226,6 @@ class VideoSequence(FramesInOrder, UnposedSource):
         super().__init__(self.path, self.path.stem, sensor, settings, fps, split)
         own = self._reader.scan()
         self.check_size(self._reader.read(0))
-        self._size_checked = True
         if fps is None and times is None:
             self._stamps = self._own_stamps(own)
         else:

@@ -43,9 +43,9 @@ class Sink(Protocol):
         stream
             ``image``, ``left``, ``right`` or ``depth``.
         array
-            Grey (h, w) or colour (h, w, 3), uint8 or uint16; depth (h, w), uint16 or float32. The
-            sink keeps the array: give one that nobody writes to any more. The order of the colours
-            is that of the settings (``Camera.RGB``), so BGR unless `Device.settings` says RGB.
+            Grey (h, w) or colour in the order BGR (h, w, 3), uint8 or uint16; depth (h, w), uint16
+            or float32. The sink keeps the array: give one that nobody writes to any more. Raw
+            images of a pair are rectified later, if the settings say how.
         stamp
             Time of the image on the clock of the device, seconds. All streams of a device, the IMU
             too, share one clock. Its zero does not matter.
@@ -94,9 +94,9 @@ class Sink(Protocol):
         ...
 
     def warning(self, text: str, /) -> None:
-        """Report something that the user must know: the end of a sentence that begins with the name.
+        """Report something to the user: the end of a sentence that begins with the device's name.
 
-        Equal texts are logged once and counted.
+        Equal texts are logged once, and counted.
         """
         ...
 

@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import cast
 
 from orbslam2py.errors import DatasetError
 from orbslam2py.live.device import Device, FoundDevice, Request
+from orbslam2py.settings import Sensor
+
+#: What stands before the colon; a single letter is a drive of Windows.
+_PREFIX = re.compile(r"[a-z][a-z0-9]+")
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,10 @@ class Kind:
         may raise `ModuleNotFoundError` for a package that is not installed.
     extra
         Extra of the package that installs what the module needs; None if it needs nothing.
+    sensors
+        What its images can be used for, the one by default first.
+    has_topics
+        Whether ``--topics`` goes with it.
     """
 
     prefix: str
@@ -37,6 +46,8 @@ class Kind:
     what: str
     module: str
     extra: str | None = None
+    sensors: tuple[Sensor, ...] = (Sensor.MONOCULAR,)
+    has_topics: bool = False
 
     def open(self, request: Request) -> Device:
         """Make a device, without starting it.
@@ -76,13 +87,60 @@ class Kind:
 
 
 #: A new kind is one entry here.
-KINDS: tuple[Kind, ...] = ()
+KINDS: tuple[Kind, ...] = (
+    Kind(
+        "realsense",
+        "realsense:",
+        "RealSense camera, by its serial number or the first one",
+        "orbslam2py.live.realsense",
+        "realsense",
+        sensors=(Sensor.STEREO, Sensor.RGBD, Sensor.MONOCULAR),
+    ),
+    Kind(
+        "oak",
+        "oak:",
+        "OAK camera, by its id or the first one",
+        "orbslam2py.live.oak",
+        "oak",
+        sensors=(Sensor.STEREO, Sensor.RGBD, Sensor.MONOCULAR),
+    ),
+    Kind(
+        "v4l",
+        "v4l:0",
+        "webcam or USB pair, by its number or device file",
+        "orbslam2py.live.capture",
+    ),
+    Kind(
+        "rtsp",
+        "rtsp://HOST/PATH",
+        "camera on the network",
+        "orbslam2py.live.capture",
+    ),
+    Kind(
+        "http",
+        "http://HOST/PATH",
+        "camera on the network that sends MJPEG",
+        "orbslam2py.live.capture",
+    ),
+)
 
 
 def kind_of(source: str) -> tuple[Kind, str] | None:
-    """Split the name of a live source into its kind and the address; None if it is none."""
-    for kind in KINDS:
-        if source.startswith(f"{kind.prefix}:"):
-            is_url = source.startswith(f"{kind.prefix}://")
-            return kind, source if is_url else source[len(kind.prefix) + 1 :]
-    return None
+    """Split the name of a live source into its kind and the address; None if it is none.
+
+    Raises
+    ------
+    DatasetError
+        If it begins like one, but there is no such kind.
+    """
+    prefix, colon, rest = source.partition(":")
+    if not colon or _PREFIX.fullmatch(prefix) is None:
+        return None
+    kind = next((kind for kind in KINDS if kind.prefix == prefix), None)
+    if kind is None:
+        examples = ", ".join(kind.example for kind in KINDS)
+        raise DatasetError(
+            f"{source} does not exist, and '{prefix}:' is no kind of live source; there are: "
+            f"{examples}"
+        )
+    return kind, source if rest.startswith("//") else rest

@@ -28,15 +28,15 @@ def sequences(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def failing(error: BaseException, name: str) -> Callable[..., Any]:
-    """`open_input` that fails for one sequence."""
-    real = work.open_input
+    """`open_source` that fails for one sequence."""
+    real = work.open_source
 
-    def open_input(path: Path, *rest: Any, **more: Any) -> Any:
+    def open_source(path: Path, *rest: Any, **more: Any) -> Any:
         if Path(path).name == name:
             raise error
         return real(path, *rest, **more)
 
-    return open_input
+    return open_source
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_what_nobody_foresaw_is_a_reason(
     error: Exception,
     reason: str,
 ) -> None:
-    monkeypatch.setattr(work, "open_input", failing(error, "one"))
+    monkeypatch.setattr(work, "open_source", failing(error, "one"))
     with caplog.at_level(logging.ERROR):
         done = orb.batch(jobs_of(sequences, seeds=1), tmp_path / "out", workers=0)
     assert [row["state"] for row in done.rows] == ["failed", "done"]
@@ -84,7 +84,7 @@ def test_what_was_foreseen_needs_no_traceback(
     error: Exception,
     reason: str,
 ) -> None:
-    monkeypatch.setattr(work, "open_input", failing(error, "one"))
+    monkeypatch.setattr(work, "open_source", failing(error, "one"))
     done = orb.batch(jobs_of(sequences, seeds=1), tmp_path / "out", workers=0)
     assert [row["reason"] for row in done.rows] == [reason, None]
     assert not [record for record in caplog.records if record.levelno >= logging.ERROR]
@@ -93,7 +93,7 @@ def test_what_was_foreseen_needs_no_traceback(
 def test_ctrl_c_goes_on_to_the_caller(
     sequences: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(work, "open_input", failing(KeyboardInterrupt(), "one"))
+    monkeypatch.setattr(work, "open_source", failing(KeyboardInterrupt(), "one"))
     with pytest.raises(KeyboardInterrupt):
         orb.batch(jobs_of(sequences, seeds=1), tmp_path / "out", workers=0)
 
@@ -101,9 +101,9 @@ def test_ctrl_c_goes_on_to_the_caller(
 def test_what_ends_a_run_on_the_way_is_named_with_its_kind(
     sequences: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = work.open_input
+    real = work.open_source
 
-    def open_input(path: Path, *rest: Any, **more: Any) -> Any:
+    def open_source(path: Path, *rest: Any, **more: Any) -> Any:
         sequence: Any = real(path, *rest, **more)
 
         def load(index: int) -> Any:
@@ -112,7 +112,7 @@ def test_what_ends_a_run_on_the_way_is_named_with_its_kind(
         sequence.load = load
         return sequence
 
-    monkeypatch.setattr(work, "open_input", open_input)
+    monkeypatch.setattr(work, "open_source", open_source)
     done = orb.batch(jobs_of(sequences, seeds=1), tmp_path / "out", workers=0)
     assert [row["reason"] for row in done.rows] == ["KeyError: 'width'"] * 2
 

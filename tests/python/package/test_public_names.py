@@ -69,6 +69,7 @@ NAMES = {
     "merge_maps",
     "batch",
     "open_sequence",
+    "open_source",
     "optimize_map",
     "run_sequence",
 }
@@ -77,6 +78,7 @@ NAMES = {
 ROOMS = {
     "calibration": ["Board", "Calibration", "calibrate", "find_views", "read_camera_file"],
     "datasets": ["ImageFolder", "Images", "LiveCamera", "Sequence", "VideoSequence", "open_input"],
+    "live": ["Device", "LiveCamera", "LiveStream", "Request", "Sink", "open_source"],
     "evaluation": ["Alignment", "align", "evaluate_trajectory", "lap_error"],
     "maps": [
         *("MapChanges", "MapFollower", "MapSnapshot"),

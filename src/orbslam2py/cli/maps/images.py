@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orbslam2py.datasets import Sequence, open_input
+from orbslam2py.datasets import Sequence
 from orbslam2py.errors import DatasetError
+from orbslam2py.live import open_source
 from orbslam2py.maps import SavedMap
 from orbslam2py.runs.feeds import is_sequence
 
@@ -21,7 +22,7 @@ def open_images(
     DatasetError
         If it is no recorded sequence.
     """
-    sequence = open_input(
+    sequence = open_source(
         images, saved.sensor, settings=saved.settings, fps=fps, times=times, split=split
     )
     if not is_sequence(sequence):

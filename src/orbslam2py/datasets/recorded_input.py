@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From what a user names to images: a folder, a bag, a video or a camera."""
+"""From what a user names to recorded images: a folder, a bag or a video."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ import mimetypes
 from collections.abc import Mapping
 from pathlib import Path
 
-from orbslam2py._arguments import is_whole, path_of
+from orbslam2py._arguments import path_of
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.bags import BagSequence
-from orbslam2py.datasets.base import IterableSequence, LiveSource
+from orbslam2py.datasets.base import IterableSequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import find_depth_pair
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
 from orbslam2py.datasets.images import open_video
-from orbslam2py.datasets.live import LiveCamera
-from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
+from orbslam2py.datasets.masks import MaskedSequence
 from orbslam2py.datasets.recognise import (
     has_layout,
     is_recording,
@@ -36,8 +35,8 @@ _OTHER_FILES = (
 )
 
 
-def open_input(
-    source: str | Path | int,
+def open_recorded(
+    source: str | Path,
     sensor: Sensor | str | None = None,
     *,
     settings: SettingsChoice = None,
@@ -46,22 +45,21 @@ def open_input(
     mask: str | Path | None = None,
     topics: Mapping[str, str] | str | None = None,
     split: bool = False,
-) -> IterableSequence | LiveSource:
-    """Open a recorded sequence, a bag, a folder of images, a video or a camera.
+) -> IterableSequence:
+    """Open a recorded sequence, a bag, a folder of images or a video.
 
     Parameters
     ----------
     source
         Folder of a sequence in a layout that `open_sequence` knows, folder of images, folder with a
         folder of images and one of depth, or with images of a left and a right camera (two folders,
-        or two series of images), bag of ROS 1 or ROS 2 (file or folder), video file, or number of a
-        camera (also as text, if there is no file of that name).
+        or two series of images), bag of ROS 1 or ROS 2 (file or folder), or video file.
     sensor
         What to deliver images for; by default the richest there is.
     settings
         Settings, a file, a built-in name, or None to let the folder decide.
     fps
-        Images per second of a folder of images or a video; the rate a camera is asked for.
+        Images per second of a folder of images or a video.
     times
         File with one time stamp per image of a folder of images or a video: decimal seconds or
         whole nanoseconds, with the images' file names or without.
@@ -70,13 +68,8 @@ def open_input(
     topics
         Of a bag: which topics are the images, as `BagSequence` takes them.
     split
-        Of a folder of images, a video or a camera: whether every image holds the left view in its
-        left half and the right view in its right half.
-
-    Returns
-    -------
-    IterableSequence or LiveSource
-        A `LiveSource`, opened already, for a camera.
+        Of a folder of images or a video: whether every image holds the left view in its left half
+        and the right view in its right half.
 
     Raises
     ------
@@ -87,26 +80,13 @@ def open_input(
     ImageError
         If the mask is no readable image.
     """
-    if is_whole(source) and int(str(source)) < 0:
-        raise DatasetError(f"there is no camera {source}; cameras are numbered from 0")
-    named = Path(str(source)) if is_whole(source) else path_of(source, "what to open")
-    if is_whole(source) or (str(source).isdecimal() and not named.exists()):
-        number = int(str(source))
-        if times is not None:
-            raise DatasetError(
-                "--times does not go with a camera: its images get their own times; leave it out"
-            )
-        _refuse_topics(source, topics)
-        camera = LiveCamera(number, sensor, settings=settings, fps=fps, split=split)
-        live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
-        live.open()
-        return live
+    named = path_of(source, "what to open")
     if is_recording(named):
         sequence: IterableSequence = BagSequence(named, sensor, settings=settings, topics=topics)
         _refuse_times(named, sequence.layout, fps, times)
         _refuse_split(named, sequence.layout, split)
     else:
-        _refuse_topics(named, topics)
+        refuse_topics(named, topics)
         sequence = _open_recorded(named, sensor, settings, fps, times, split)
     return sequence if mask is None else MaskedSequence(sequence, mask)
 
@@ -167,7 +147,8 @@ def _refuse_times(path: Path, layout: str, fps: float | None, times: str | Path 
             )
 
 
-def _refuse_topics(source: object, topics: Mapping[str, str] | str | None) -> None:
+def refuse_topics(source: object, topics: Mapping[str, str] | str | None) -> None:
+    """Raise `DatasetError` if topics are named for something that has none."""
     if topics is not None:
         raise DatasetError(f"--topics is for a bag, which {source} is not; leave it out")
 
