@@ -9,6 +9,12 @@ import typer
 from rich.console import Console
 
 from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.publishing import (
+    BaseFrameOption,
+    BaseTransformOption,
+    PublishOption,
+    PublishOptions,
+)
 from orbslam2py.cli.run_and_show import run_and_show
 from orbslam2py.cli.run_arguments import read_initial_pose
 from orbslam2py.cli.run_options import (
@@ -116,6 +122,9 @@ def run(
     seed: SeedOption = 0,
     video: VideoOption = None,
     record: RecordOption = None,
+    publish: PublishOption = None,
+    base_frame: BaseFrameOption = None,
+    base_transform: BaseTransformOption = None,
     force: ForceFlag = False,
     no_report: NoReportFlag = False,
     viewer: ViewerFlag = False,
@@ -141,6 +150,7 @@ def run(
         )
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
+    publishing = PublishOptions.of(sequence, publish, base_frame, base_transform)
     loaded = None if load is None else MapFile(load)
     chosen: Settings | str | None = settings
     if loaded is not None and settings is None:
@@ -196,6 +206,7 @@ def run(
         viewer=look,
         video=video,
         record=record,
+        publish=publishing,
         inputs=[Path(given) for given in (sequence, settings, times, mask, vocabulary) if given],
         quiet=quiet,
     )

@@ -17,6 +17,7 @@ from orbslam2py.cli.display import Display, progress_bar, report_table
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.cli.messages import log_to, print_error, tell_repeated
+from orbslam2py.cli.publishing import Publishing, PublishOptions
 from orbslam2py.cli.targets import check_apart
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
@@ -45,6 +46,7 @@ def run_and_show(
     quiet: bool = False,
     video: Path | None = None,
     record: Path | None = None,
+    publish: PublishOptions | None = None,
     inputs: Iterable[Path] = (),
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code.
@@ -77,6 +79,9 @@ def run_and_show(
                 viewer or ViewerOptions(), sequence, interrupt.event, in_real_time=in_real_time
             )
             page.enter_context(viewing)
+            publishing = page.enter_context(
+                Publishing(publish or PublishOptions(), sequence, options.save_map, output)
+            )
             with progress_bar(console) as bar:
                 display = Display(bar, n_frames)
 
@@ -86,7 +91,7 @@ def run_and_show(
                     files.count(row)
 
                 done = run_sequence(
-                    sequence,
+                    publishing.sequence,
                     options,
                     vocabulary=words,
                     output=output,
@@ -95,7 +100,7 @@ def run_and_show(
                     command=shlex.join(["orbslam2py", *sys.argv[1:]]),
                     progress=progress,
                     control=viewing.control,
-                    watch=watch_all(viewing.watch, files.watch),
+                    watch=watch_all(viewing.watch, files.watch, publishing.watch),
                 )
         tell_repeated()
         console.print(report_table(done.report))

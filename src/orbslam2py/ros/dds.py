@@ -88,7 +88,9 @@ class DdsTransport:
     def __init__(self, address: str = "") -> None:
         self.domain = domain_of(address, self.prefix)
         self._lock = threading.RLock()
+        self._closed = False
         self._open: list[_Reader] = []
+        self._writers: list[_Writer] = []
         self._topics: dict[tuple[str, str], Topic[Any]] = {}
         self.where = _configure(self.domain)
         try:
@@ -132,7 +134,7 @@ class DdsTransport:
         """Publish a topic; see `Transport.publish`."""
         qos = _quality(1 if latched else _DEPTH, latched=latched, data=f"typehash={_hash(kind)};")
         made = self._topic(f"{_TOPIC}{name}", kind)
-        return _Writer(DataWriter(self._participant, made, qos=qos), name)
+        return self._write(DataWriter(self._participant, made, qos=qos), name)
 
     def serve(self, name: str, kind: str, answer: Answer) -> None:
         """Answer requests as rmw_cyclonedds sends them; see `Transport.serve`.
@@ -143,7 +145,7 @@ class DdsTransport:
         qos = _quality(_DEPTH, data=f"serviceid= {number};")
         replies = self._topic(f"{_REPLY}{name}Reply", f"{kind}_Response", is_request=True)
         requests = self._topic(f"{_REQUEST}{name}Request", f"{kind}_Request", is_request=True)
-        writer = _Writer(DataWriter(self._participant, replies, qos=qos), name)
+        writer = self._write(DataWriter(self._participant, replies, qos=qos), name)
 
         def receive(content: bytes) -> None:
             order, rest = content[:_ORDER_SIZE], content[_ORDER_SIZE:]
@@ -160,8 +162,17 @@ class DdsTransport:
         """End all of it."""
         with self._lock:
             readers, self._open = self._open, []
+            is_first, self._closed = not self._closed, True
         for reader in readers:
             reader.close()
+        if is_first:  # with all that belongs to it: others notice at once
+            self._participant.__del__()
+
+    def _write(self, writer: DataWriter[Any], name: str) -> _Writer:
+        made = _Writer(writer, name)
+        with self._lock:
+            self._writers.append(made)
+        return made
 
     def _read(self, reader: DataReader[Any], receive: Receive) -> _Reader:
         made = _Reader(self._participant, reader, receive)
@@ -189,11 +200,12 @@ class _Reader:
     def __init__(
         self, participant: DomainParticipant, reader: DataReader[Any], receive: Receive
     ) -> None:
-        self._reader, self._receive = reader, receive
+        self._receive = receive
         self._stopped = threading.Event()
-        self._waits = WaitSet(participant)
-        self._condition = ReadCondition(reader, _ANY)
-        self._waits.attach(self._condition)
+        waits = WaitSet(participant)
+        waits.attach(ReadCondition(reader, _ANY))
+        #: What ends when nothing refers to it any more.
+        self._entities: tuple[WaitSet, DataReader[Any]] | None = (waits, reader)
         self._thread = threading.Thread(target=self._run, name="dds reader", daemon=True)
         self._thread.start()
 
@@ -201,13 +213,16 @@ class _Reader:
         self._stopped.set()
         if threading.current_thread() is not self._thread:
             self._thread.join()
+            self._entities = None
 
     def _run(self) -> None:
+        assert self._entities is not None
+        waits, reader = self._entities
         while not self._stopped.is_set():
             try:
-                if not self._waits.wait(_SLICE):
+                if not waits.wait(_SLICE):
                     continue
-                taken = ddspy_take(self._reader._ref, _ANY, _DEPTH)
+                taken = ddspy_take(reader._ref, _ANY, _DEPTH)
             except DDSException as error:
                 _log.warning("ros2: %s", error)
                 return
@@ -271,7 +286,7 @@ def _configure(number: int) -> str:
 def _configuration() -> tuple[str, str]:
     interfaces = [] if is_local_only() else network_interfaces()
     if not interfaces:
-        general, where = _LOCAL, f"{LOOPBACK} (127.0.0.1), this computer only"
+        general, where = _LOCAL, f"{LOOPBACK} (127.0.0.1), to nodes of this computer only"
     else:
         named = "".join(f'<NetworkInterface name="{one.name}"/>' for one in interfaces)
         general = f"<General><Interfaces>{named}</Interfaces></General>"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
@@ -35,6 +36,8 @@ _log = logging.getLogger(__name__)
 
 #: Images per second if their stamps do not tell it.
 _USUAL_RATE = 30.0
+#: Images whose exact stamps are kept: those that wait to be tracked.
+_MOST_STAMPS = 1000
 #: A stamp counts as the time of the exposure if the image is no older than this, seconds; else the
 #: clocks of robot and computer are not the same.
 _OLDEST = 1.0
@@ -69,6 +72,8 @@ class TopicsDevice:
         self._lock = threading.RLock()
         self._subscriptions: list[Subscription] = []
         self._sink: Sink | None = None
+        #: Stamps [ns] by what the sink gets [s], which cannot hold all their digits.
+        self._nanoseconds: OrderedDict[float, int] = OrderedDict()
         _log.info(
             "%s domain %d, on %s",
             *(self.name, self._transport.domain, self._transport.where),
@@ -99,6 +104,10 @@ class TopicsDevice:
     def frame(self) -> str:
         """Name of the coordinates of the (left) camera, as its messages have it."""
         return self._heads[0][1].strip("/")
+
+    def nanoseconds_of(self, stamp: float) -> int:
+        """Return the stamp of an image with all digits [ns], by its stamp in seconds."""
+        return self._nanoseconds.get(stamp, round(stamp * 1e9))
 
     def between(self, target: str, source: str) -> FloatArray | None:
         """Return ``T_target_source`` (4, 4) [m] by the static transforms; None if unknown."""
@@ -234,10 +243,14 @@ class TopicsDevice:
         except OrbSlamError as error:
             sink.warning(f"an image of {image.topic.name} cannot be used: {error}")
             return
-        stamp = stamp_of(message.header) / 1e9
-        if not stamp:
+        exact = stamp_of(message.header)
+        if not exact:
             sink.warning(f"{image.topic.name} has no stamps; the times of arrival are taken")
-            stamp = arrival
+            exact = round(arrival * 1e9)
+        stamp = exact / 1e9
+        self._nanoseconds[stamp] = exact
+        if len(self._nanoseconds) > _MOST_STAMPS:
+            self._nanoseconds.popitem(last=False)
         age = arrival - stamp
         exposure = time.monotonic() - age if 0 <= age < _OLDEST else None
         sink.image(stream, array, stamp, exposure)

@@ -15,6 +15,8 @@ from orbslam2py.trajectory.rotations import inverse_poses
 
 #: Attempts to read two poses of one state of the map, which others write.
 _ATTEMPTS = 5
+#: Numbers of a pose that is read twice differ by less than this if nobody moved the map.
+_STILL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ class SmoothOdometry:
     def __init__(self, slam_map: core.Map) -> None:
         self._map = slam_map
         self._before: core.TrackedFrame | None = None
-        self._time = 0.0
+        self._time, self._map_index = 0.0, -1
         self._T_oc: FloatArray | None = None
 
     def add(self, watched: WatchedFrame) -> OdometryStep | None:
@@ -62,24 +64,25 @@ class SmoothOdometry:
         record, kept = watched.record, watched.kept_pose()
         if record.T_wc is None or kept is None:
             return None
-        moved = None if self._before is None else self._motion(self._before, kept)
+        is_same_map = self._before is not None and record.map_index == self._map_index
+        moved = self._motion(self._before, kept) if is_same_map and self._before else None
         if self._T_oc is None:
             self._T_oc = record.T_wc
         elif moved is not None:
             self._T_oc = self._T_oc @ moved
         step = OdometryStep(self._T_oc.copy(), moved, record.timestamp - self._time)
-        self._before, self._time = kept, record.timestamp
+        self._before, self._time, self._map_index = kept, record.timestamp, record.map_index
         return step
 
     def _motion(self, before: core.TrackedFrame, now: core.TrackedFrame) -> FloatArray | None:
-        """Return the pose of now in the coordinates of before; None if the maps differ."""
+        """Return the pose of now in the coordinates of before; None if the map is no more."""
         for _ in range(_ATTEMPTS):
             first = self._pose(before)
             second = self._pose(now)
             again = self._pose(before)
             if first is None or second is None or again is None:
                 return None
-            if np.array_equal(first, again):  # nobody moved the map meanwhile
+            if np.allclose(first, again, rtol=0, atol=_STILL):  # nobody moved the map meanwhile
                 return np.asarray(first @ inverse_poses(second), np.float64)
         return None
 

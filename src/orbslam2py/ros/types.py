@@ -94,7 +94,7 @@ def from_cdr(content: bytes, kind: str) -> Any:
     DatasetError
         If it is damaged.
     """
-    return read_message(content, kind, "cdr")
+    return read_message(content, kind, "cdr", type_store())
 
 
 def is_known(kind: str) -> bool:
