@@ -80,7 +80,13 @@ def run_and_show(
             )
             page.enter_context(viewing)
             publishing = page.enter_context(
-                Publishing(publish or PublishOptions(), sequence, options.save_map, output)
+                Publishing(
+                    publish or PublishOptions(),
+                    sequence,
+                    in_time=in_real_time,
+                    map_path=options.save_map,
+                    output=output,
+                )
             )
             with progress_bar(console) as bar:
                 display = Display(bar, n_frames)

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.cli.publishing import MCAP
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.runs.feeds import is_sequence
@@ -39,7 +40,9 @@ VideoOption = Annotated[
 RecordOption = Annotated[
     Path | None,
     typer.Option(
-        help="Record images, map, plots and events for Rerun's viewer (needs orbslam2py[rerun]).",
+        help="Record images, map, plots and events for Rerun's viewer (.rrd, needs "
+        "orbslam2py[rerun]), or poses, map and images for Foxglove and ROS 2 (.mcap, needs "
+        "orbslam2py[foxglove]).",
         metavar="FILE.rrd",
     ),
 ]
@@ -88,7 +91,10 @@ class FileWatchers:
         self.files["video"] = path
 
     def add_recording(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
-        """Write a recording for Rerun."""
+        """Write a recording for Rerun; those for Foxglove are published, see `publishing`."""
+        if path.suffix.lower() == MCAP:
+            self.files["recording"] = path
+            return
         from orbslam2py.recordings.rerun_recorder import RerunRecorder  # noqa: PLC0415
 
         recorder = RerunRecorder(

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +49,18 @@ class BaseFrame:
     child: str
     T_base_child: FloatArray | None
     publishes_tf: bool = True
+
+
+def base_of_camera() -> BaseFrame:
+    """Return a base at the camera, which looks forward, for viewers."""
+    T = pose_of_forward_camera()
+    return BaseFrame(BASE, _OPTICAL, RobotBase(T), _OPTICAL, T)
+
+
+def for_viewers(base: BaseFrame) -> BaseFrame:
+    """Return the same with all its transforms, for those who do not hear the robot's."""
+    T = base.robot.T_base_camera
+    return replace(base, child=base.camera, T_base_child=T, publishes_tf=True)
 
 
 def choose_base(

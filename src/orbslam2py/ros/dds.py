@@ -243,7 +243,7 @@ class _Writer:
     def __init__(self, writer: DataWriter[Any], name: str) -> None:
         self._writer, self._name = writer, name
 
-    def send(self, content: bytes) -> None:
+    def send(self, content: bytes, stamp: int | None = None) -> None:
         padded = content.ljust(-(-len(content) // 4) * 4, b"\0")
         code = ddspy_write(self._writer._ref, padded)
         if code < 0:

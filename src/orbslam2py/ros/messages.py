@@ -20,7 +20,12 @@ PATH = "nav_msgs/msg/Path"
 POINTS = "sensor_msgs/msg/PointCloud2"
 STRING = "std_msgs/msg/String"
 TF = "tf2_msgs/msg/TFMessage"
+IMAGE = "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+MARKER = "visualization_msgs/msg/ImageMarker"
 _NANO = 10**9
+#: `ImageMarker.POINTS`, and the size of a point in pixels.
+_POINTS_OF_IMAGE, _POINT_SIZE = 4, 3.0
 #: `PointField.FLOAT32`, and its bytes.
 _FLOAT32, _FLOAT_SIZE = 7, 4
 
@@ -121,6 +126,35 @@ def points(head: Heading, positions: FloatArray) -> Any:
     data = np.ascontiguousarray(positions, "<f4").view(np.uint8).reshape(-1)
     step, n = 3 * _FLOAT_SIZE, len(positions)
     return message_class(POINTS)(head.message(), 1, n, fields, False, step, step * n, data, True)
+
+
+def jpeg(head: Heading, content: bytes) -> Any:
+    """Make a ``CompressedImage`` of a JPEG."""
+    return message_class(IMAGE)(head.message(), "jpeg", np.frombuffer(content, np.uint8))
+
+
+def image_points(head: Heading, pixels: FloatArray, colours: FloatArray) -> Any:
+    """Make an ``ImageMarker`` of pixels (n, 2) and their colours (n, 3), 0 to 1."""
+    point, colour = (
+        message_class("geometry_msgs/msg/Point"),
+        message_class("std_msgs/msg/ColorRGBA"),
+    )
+    black = colour(0.0, 0.0, 0.0, 0.0)
+    lifetime = message_class("builtin_interfaces/msg/Duration")(0, 0)
+    places = [point(x, y, 0.0) for x, y in pixels.tolist()]
+    painted = [colour(*one, 1.0) for one in colours.tolist()]
+    fields = (0, _POINTS_OF_IMAGE, 0, point(0.0, 0.0, 0.0), _POINT_SIZE, black, 0, black, lifetime)
+    return message_class(MARKER)(head.message(), "keypoints", *fields, places, painted)
+
+
+def camera_info(head: Heading, size: tuple[int, int], K: FloatArray, D: FloatArray) -> Any:
+    """Make a ``CameraInfo``: width and height, camera matrix (3, 3), distortion k1 k2 p1 p2 k3."""
+    region = message_class("sensor_msgs/msg/RegionOfInterest")(0, 0, 0, 0, False)
+    P = np.hstack([K, np.zeros((3, 1))])
+    matrices = (np.asarray(D, np.float64), K.reshape(-1), np.eye(3).reshape(-1), P.reshape(-1))
+    width, height = size
+    kind = message_class(CAMERA_INFO)
+    return kind(head.message(), height, width, "plumb_bob", *matrices, 0, 0, region)
 
 
 def string(text: str) -> Any:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import queue
 import threading
@@ -21,6 +22,7 @@ from orbslam2py.maps.changes import MapFollower
 from orbslam2py.recordings.growing_map import GrowingMap
 from orbslam2py.ros import messages
 from orbslam2py.ros.base_frame import BaseFrame
+from orbslam2py.ros.image_output import ImageOutput, SeenImage
 from orbslam2py.ros.messages import Heading, Transform
 from orbslam2py.ros.odometry import OdometryStep, SmoothOdometry
 from orbslam2py.ros.services import serve
@@ -41,6 +43,8 @@ _MAP_EVERY = 1.0
 _ROOM = 50
 #: Variance of a velocity that is not known: filters pass over it.
 _UNKNOWN = 1e9
+#: Seconds between two looks at whether the thread still takes images.
+_WAIT_SLICE = 0.2
 #: Topics by their last name: type, and whether those who come later get the last message.
 _TOPICS = {
     "pose": (messages.POSE, False),
@@ -60,6 +64,7 @@ StampOf = Callable[[float], int]
 class _News:
     record: TrackingRecord
     step: OdometryStep | None
+    seen: SeenImage | None
 
 
 class RosOutput:
@@ -79,7 +84,11 @@ class RosOutput:
     stamp_of
         Tells the stamp of the images that belong to a time of the system.
     map_path
-        File in which the service ``save_map`` saves the map.
+        File in which the service ``save_map`` saves the map; None: no services.
+    with_images
+        Also publish images with their keypoints and the calibration, for viewers.
+    every_image
+        Pass over no image: the track call waits until there is room for it.
     """
 
     def __init__(
@@ -88,7 +97,10 @@ class RosOutput:
         system: System,
         base: BaseFrame,
         stamp_of: StampOf,
-        map_path: Path,
+        map_path: Path | None,
+        *,
+        with_images: bool = False,
+        every_image: bool = False,
     ) -> None:
         self._transport = transport
         self._pipeline = system.pipeline
@@ -99,7 +111,9 @@ class RosOutput:
         self._map = GrowingMap()
         self._keyframes: dict[int, tuple[float, FloatArray]] = {}
         self._before: TrackingRecord | None = None
-        self._state, self._stamp, self._map_due = "", 0, 0.0
+        self._state, self._map_due = "", 0.0
+        self._stamp: int = 0
+        self._has_begun = False
         self._failed: set[str] = set()
         self._queue: queue.Queue[_News | None] = queue.Queue(_ROOM)
         self._out: dict[str, Publication] = {
@@ -110,15 +124,13 @@ class RosOutput:
             self._out[_TF] = transport.publish(_TF, messages.TF)
             if base.T_base_child is not None:
                 self._out[_TF_STATIC] = transport.publish(_TF_STATIC, messages.TF, latched=True)
-        serve(transport, system, map_path)
+        self._images = ImageOutput(transport, system, base, every=every_image, wanted=with_images)
+        self._every_image = every_image
+        if map_path is not None:
+            serve(transport, system, map_path)
         self._thread = threading.Thread(target=self._run, name="ros output", daemon=True)
 
     def __enter__(self) -> RosOutput:
-        self._say_state("NO_IMAGES_YET")
-        if _TF_STATIC in self._out and self._base.T_base_child is not None:
-            head = Heading(time.time_ns(), self._base.name)
-            fixed = Transform(head, self._base.child, self._base.T_base_child)
-            self._send(_TF_STATIC, messages.transforms([fixed]))
         self._pipeline.frame_watchers += (self._see,)
         self._thread.start()
         return self
@@ -138,7 +150,13 @@ class RosOutput:
 
     # ---- in the thread that tracks ---------------------------------------------------------------
     def _see(self, watched: WatchedFrame) -> None:
-        news = _News(watched.record, self._odometry.add(watched))
+        news = _News(watched.record, self._odometry.add(watched), self._images.seen(watched))
+        if self._every_image:
+            while self._thread.is_alive():
+                with contextlib.suppress(queue.Full):
+                    self._queue.put(news, timeout=_WAIT_SLICE)
+                    return
+            return
         while True:
             try:
                 self._queue.put_nowait(news)
@@ -161,6 +179,11 @@ class RosOutput:
     def _publish(self, news: _News) -> None:
         record, step = news.record, news.step
         self._stamp = self._stamp_of(record.timestamp)
+        if not self._has_begun:
+            self._has_begun = True
+            self._publish_static_transform()
+        if news.seen is not None:
+            self._images.publish(news.seen, self._stamp)
         state = record.state.name
         self._say_state(f"{state}: {record.reason}" if str(record.reason) else state)
         if record.state is not TrackingState.OK or record.T_wc is None or step is None:
@@ -182,6 +205,12 @@ class RosOutput:
             moved = Transform(Heading(self._stamp, ODOM), base, T_ob)
             self._send(_TF, messages.transforms([corrected, moved]))
         self._before = record
+
+    def _publish_static_transform(self) -> None:
+        if _TF_STATIC in self._out and self._base.T_base_child is not None:
+            head = Heading(self._stamp, self._base.name)
+            fixed = Transform(head, self._base.child, self._base.T_base_child)
+            self._send(_TF_STATIC, messages.transforms([fixed]))
 
     def _publish_odometry(
         self, record: TrackingRecord, step: OdometryStep, T_ob: FloatArray
@@ -233,7 +262,7 @@ class RosOutput:
 
     def _send(self, name: str, message: Any) -> None:
         try:
-            self._out[name].send(to_cdr(message))
+            self._out[name].send(to_cdr(message), self._stamp)
         except OrbSlamError as error:
             if name not in self._failed:
                 self._failed.add(name)

@@ -57,8 +57,16 @@ class Subscription(Protocol):
 class Publication(Protocol):
     """A topic that is being published."""
 
-    def send(self, content: bytes) -> None:
-        """Publish a message, serialised as CDR. Does not wait for those who receive it."""
+    def send(self, content: bytes, stamp: int | None = None) -> None:
+        """Publish a message, serialised as CDR. Does not wait for those who receive it.
+
+        Parameters
+        ----------
+        content
+            The bytes.
+        stamp
+            Time that it is about, nanoseconds, for files; now if it is None.
+        """
         ...
 
 

@@ -258,7 +258,7 @@ class _Writer:
         self._publisher, self._token = publisher, token
         self._numbers = itertools.count(1)
 
-    def send(self, content: bytes) -> None:
+    def send(self, content: bytes, stamp: int | None = None) -> None:
         attachment = attachment_of(next(self._numbers), time.time_ns(), self._token)
         self._publisher.put(content, attachment=attachment)
 

@@ -80,5 +80,5 @@ class _Publication:
     network: MemoryNetwork
     name: str
 
-    def send(self, content: bytes) -> None:
+    def send(self, content: bytes, stamp: int | None = None) -> None:
         self.network.send(self.name, content)
