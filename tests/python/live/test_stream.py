@@ -164,7 +164,7 @@ def test_times_go_on_over_a_restart(restarts_clock: bool) -> None:
     frames, source = frames_of(camera)
     check_nothing_is_lost(camera, source, frames)
     away = frames[31].timestamp - frames[30].timestamp
-    assert away == pytest.approx(source.counts()["seconds_lost"], abs=0.05)
+    assert away == pytest.approx(source.counts()["seconds_lost"], abs=0.3)
     assert begin < frames[0].timestamp < frames[-1].timestamp < time.time() + 0.1
     assert source.counts()["clock_jumps"] == 0
 

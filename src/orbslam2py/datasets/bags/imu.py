@@ -7,10 +7,12 @@ import logging
 
 import numpy as np
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.bags.bag import Bag, Topic
 from orbslam2py.datasets.bags.messages import ENCODINGS, IMU, read_message, stamp_of
 from orbslam2py.datasets.bags.parts import naming_damage
+from orbslam2py.datasets.bags.realsense import stamps_of_imu
 from orbslam2py.datasets.imu import ImuSamples, joined_streams, make_samples
 
 _log = logging.getLogger(__name__)
@@ -62,9 +64,19 @@ def read_imu(bag: Bag) -> ImuSamples | None:
 def _rows(bag: Bag, topic: Topic) -> FloatArray:
     """Rows of a topic: time [s], angular rate and specific force, (n, 7)."""
     rows = []
+    stamps, n_untimed = stamps_of_imu(bag, topic), 0
     for message in bag.messages(topic):
         with naming_damage(bag.path):
             read = read_message(bag.read(message), topic.kind, topic.encoding)
         w, a = read.angular_velocity, read.linear_acceleration
-        rows.append([stamp_of(read.header) / 1e9, w.x, w.y, w.z, a.x, a.y, a.z])
+        stamp = stamps.get(message.recorded) if stamps else stamp_of(read.header)
+        if stamp is None:
+            n_untimed += 1
+            continue
+        rows.append([stamp / 1e9, w.x, w.y, w.z, a.x, a.y, a.z])
+    if n_untimed:
+        _log.warning(
+            "%s: %s of %s without a time of the camera, left out",
+            *(bag.path, number_of(n_untimed, "sample"), topic.name),
+        )
     return np.array(rows, dtype=np.float64).reshape(-1, 7)

@@ -80,7 +80,7 @@ def camera_times(
     of_sdk = [one for one in images if stream_of(one) and one.topic.encoding == "cdr"]
     if len(of_sdk) < len(images):
         return timed
-    stamps = [_camera_stamps(bag, one) for one in images]
+    stamps = [_camera_stamps(bag, one.base) for one in images]
     retimed = [
         _retimed(messages, {at: stamp for at, (_, stamp) in found.items()})
         for messages, found in zip(timed, stamps, strict=True)
@@ -137,9 +137,19 @@ def is_inverse(bag: Bag, image: ImageTopic) -> bool:
     return any("model=inverse" in str(message.data).lower() for message in told)
 
 
-def _camera_stamps(bag: Bag, image: ImageTopic) -> dict[int, tuple[str, int]]:
-    """Clock and stamp [ns] of the images of a stream by the times at which they arrived."""
-    name = image.base.rpartition("/")[0] + "/metadata"
+def stamps_of_imu(bag: Bag, topic: Topic) -> dict[int, int]:
+    """Times of the camera [ns] of samples by the times at which they were recorded.
+
+    Empty if the topic is not of an SQLite file of the SDK, whose messages carry times of arrival.
+    """
+    if _STREAM.match(topic.name) is None or topic.encoding != "cdr":
+        return {}
+    return {at: stamp for at, (_, stamp) in _camera_stamps(bag, topic.name).items()}
+
+
+def _camera_stamps(bag: Bag, data: str) -> dict[int, tuple[str, int]]:
+    """Clock and stamp [ns] of the messages of a topic by the times at which they arrived."""
+    name = data.rpartition("/")[0] + "/metadata"
     stamps = {}
     for topic in bag.topics:
         if topic.name != name or topic.kind != _STRING:
