@@ -17,7 +17,7 @@ from rich.markup import escape
 from orbslam2py._arrays import FloatArray
 from orbslam2py.cli.publishing import MCAP
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import OrbSlamError
+from orbslam2py.errors import OrbSlamError, OutputFileError
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow
@@ -46,6 +46,8 @@ RecordOption = Annotated[
         metavar="FILE.rrd",
     ),
 ]
+#: Ending of recordings for Rerun.
+_RRD = ".rrd"
 #: How fast a camera's video is played: what its images are repeated or left out for [1/s].
 _LIVE_RATE = 30.0
 #: Looks at the map a second, in real time.
@@ -95,6 +97,10 @@ class FileWatchers:
         if path.suffix.lower() == MCAP:
             self.files["recording"] = path
             return
+        if path.suffix.lower() != _RRD:
+            raise OutputFileError(
+                f"{path} does not end like a recording; name it with {_RRD} or {MCAP}"
+            )
         from orbslam2py.recordings.rerun_recorder import RerunRecorder  # noqa: PLC0415
 
         recorder = RerunRecorder(

@@ -6,13 +6,15 @@ from __future__ import annotations
 from functools import partial
 
 from orbslam2py.live.device import FoundDevice, Request
-from orbslam2py.ros.dds import DdsTransport
+from orbslam2py.ros.connect import connect
 from orbslam2py.ros.device import TopicsDevice
+
+_PREFIX = "ros2"
 
 
 def open_device(request: Request) -> TopicsDevice:
     """Join the domain of a request and choose its topics, without starting."""
-    return TopicsDevice(partial(DdsTransport, request.address), DdsTransport.prefix, request)
+    return TopicsDevice(partial(connect, f"{_PREFIX}:{request.address}"), _PREFIX, request)
 
 
 def find_devices() -> list[FoundDevice]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import platform
 from functools import lru_cache
 from typing import Any
 
@@ -11,6 +12,8 @@ from orbslam2py.errors import DatasetError
 
 #: The typestore of the definitions. Types that are used here are the same from Humble to Kilted.
 _STORE = "ROS2_HUMBLE"
+#: Computers that Cyclone DDS has wheels for, beside those of Apple.
+_MACHINES = ("x86_64", "AMD64")
 TRIGGER = "std_srvs/srv/Trigger"
 SET_BOOL = "std_srvs/srv/SetBool"
 #: Parts of services, which this store does not have. An empty message has one byte in CDR, and
@@ -27,6 +30,14 @@ _SERVICE_PARTS = {
 
 def missing_extra(package: str, prefix: str) -> DatasetError:
     """Make the error for a package that is not installed."""
+    system, machine = platform.system(), platform.machine()
+    has_wheels = machine in _MACHINES or (system, machine) == ("Darwin", "arm64")
+    if package.startswith("cyclonedds") and not has_wheels:
+        return DatasetError(
+            f"{prefix}: needs the package cyclonedds, which is not built for this computer "
+            f"({system} on {machine}); run the robot's nodes with "
+            "RMW_IMPLEMENTATION=rmw_zenoh_cpp, and take zenoh: in its place"
+        )
     return DatasetError(
         f"{prefix}: needs the package {package}, which is not installed; install it: "
         'pip install "orbslam2py[ros2]"'

@@ -6,13 +6,15 @@ from __future__ import annotations
 from functools import partial
 
 from orbslam2py.live.device import FoundDevice, Request
+from orbslam2py.ros.connect import connect
 from orbslam2py.ros.device import TopicsDevice
-from orbslam2py.ros.zenoh import ZenohTransport
+
+_PREFIX = "zenoh"
 
 
 def open_device(request: Request) -> TopicsDevice:
     """Connect to the router of a request and choose its topics, without starting."""
-    return TopicsDevice(partial(ZenohTransport, request.address), ZenohTransport.prefix, request)
+    return TopicsDevice(partial(connect, f"{_PREFIX}:{request.address}"), _PREFIX, request)
 
 
 def find_devices() -> list[FoundDevice]:
