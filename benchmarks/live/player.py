@@ -64,7 +64,7 @@ class Player:
         while (due := number / rate) < seconds:
             while imu is not None and n_imu / imu_rate < due:
                 _wait(begin, n_imu / imu_rate)
-                imu.send(imu_message(time.time_ns()))
+                imu.send(imu_message(begin + round(n_imu / imu_rate * _NANO)))
                 n_imu += 1
             _wait(begin, due)
             self._send(self._place(number))
