@@ -90,8 +90,11 @@ SUBCOMMANDS = {
     "run": Subcommand(
         "run",
         "run",
-        "Track a recorded sequence, a video or a camera; write trajectory, map and report.",
+        "Track a recorded sequence, a video or a live source; write trajectory, map and report.",
         "run_arguments.RunCommand",
+    ),
+    "devices": Subcommand(
+        "devices", "devices", "List the cameras that are plugged in, with their modes."
     ),
     "batch": Subcommand(
         "batches.batch",

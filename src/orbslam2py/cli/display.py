@@ -145,7 +145,11 @@ def _error_rows(report: dict[str, Any]) -> _Rows:
 def _cost_rows(report: dict[str, Any]) -> _Rows:
     if report.get("slam_frames_per_second") is not None:
         yield "speed", f"{report['slam_frames_per_second']:.1f} frames a second"
-    for stage, name in (("track", "tracking an image"), ("mapping", "mapping a keyframe")):
+    for stage, name in (
+        ("track", "tracking an image"),
+        ("mapping", "mapping a keyframe"),
+        ("latency.total", "from exposure to pose"),
+    ):
         if stage in report["milliseconds"]:
             times = report["milliseconds"][stage]
             yield name, f"median {times['median']:.1f} ms, p99 {times['p99']:.1f} ms"

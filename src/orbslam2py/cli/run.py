@@ -32,6 +32,7 @@ from orbslam2py.cli.run_options import (
     FpsOption,
     FullAdjustmentFlag,
     FullAdjustmentTimeLimitOption,
+    ImuFlag,
     InitialPoseOption,
     LoadOption,
     LocalizeOption,
@@ -43,6 +44,7 @@ from orbslam2py.cli.run_options import (
     OutputOption,
     QuietFlag,
     RealtimeFlag,
+    RecordInputOption,
     SaveImagesFlag,
     SaveOption,
     SeedOption,
@@ -65,6 +67,7 @@ from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.live import open_source
 from orbslam2py.maps import MapFile
 from orbslam2py.maps.setup_check import check_sensor
+from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.input_folders import check_not_among_images
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Settings
@@ -86,6 +89,8 @@ EXAMPLE = """
     orbslam2py run drive.mcap --sensor stereo
 
     orbslam2py run 0 --sensor mono --settings my.yaml
+
+    orbslam2py run realsense: --sensor stereo --imu --record-input drive.mcap
 
     orbslam2py run video.mp4 --sensor mono --settings my.yaml --save office.orbmap
 
@@ -109,6 +114,7 @@ def run(
     mask: MaskOption = None,
     topics: TopicsOption = None,
     split: SplitFlag = False,
+    imu: ImuFlag = False,
     load: LoadOption = None,
     initial_pose: InitialPoseOption = None,
     allow_other_setup: AllowOtherSetupFlag = False,
@@ -133,6 +139,7 @@ def run(
     foxglove: FoxgloveFlag = False,
     foxglove_port: FoxglovePort = None,
     foxglove_host: FoxgloveHost = None,
+    record_input: RecordInputOption = None,
     force: ForceFlag = False,
     no_report: NoReportFlag = False,
     viewer: ViewerFlag = False,
@@ -141,8 +148,8 @@ def run(
     viewer_exit: ViewerExit = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
-    check_kept(video, record, force=force)
+    """Track a recorded sequence, a video or a live source; write trajectory, map and report."""
+    check_kept(video, record, record_input, force=force)
     if save_images and save is None:
         raise DatasetError("--save-images keeps images in the map that is saved: --save FILE")
     if new_map_after is not None and not several_maps:
@@ -183,7 +190,13 @@ def run(
         mask=mask,
         topics=topics,
         split=split,
+        imu=imu,
     )
+    if record_input is not None and is_sequence(images):
+        raise DatasetError(
+            f"--record-input records a live source, and {sequence} is recorded already; leave it "
+            "out"
+        )
     if output is not None:
         check_apart({"--output": output}, [] if mask is None else [mask])
         check_not_among_images(output, images, Path(sequence))
@@ -224,6 +237,7 @@ def run(
         video=video,
         record=record,
         publish=publishing,
+        record_input=record_input,
         inputs=[Path(given) for given in (sequence, settings, times, mask, vocabulary) if given],
         quiet=quiet,
     )

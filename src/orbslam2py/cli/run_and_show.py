@@ -7,7 +7,9 @@ import contextlib
 import shlex
 import sys
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import cast
 
 from rich.console import Console
 from rich.markup import escape
@@ -23,6 +25,7 @@ from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import OrbSlamError
+from orbslam2py.live import LiveStream
 from orbslam2py.maps import MapFile
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
@@ -47,6 +50,7 @@ def run_and_show(
     video: Path | None = None,
     record: Path | None = None,
     publish: PublishOptions | None = None,
+    record_input: Path | None = None,
     inputs: Iterable[Path] = (),
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code.
@@ -58,12 +62,13 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
-    check_apart({"--video": video, "--record": record, "--save": options.save_map}, inputs)
+    written = {"--video": video, "--record": record, "--record-input": record_input}
+    check_apart({**written, "--save": options.save_map}, inputs)
     output = output or new_output_folder(sequence.name)
     with contextlib.ExitStack() as page:
         if any(
             path is not None and path.resolve().parent == output.resolve()
-            for path in (video, record)
+            for path in written.values()
         ):
             settings = sequence.settings.to_yaml()
             is_new = not output.exists()
@@ -75,6 +80,7 @@ def run_and_show(
         with StopOnInterrupt() as interrupt:
             files = page.enter_context(file_watchers(sequence, options, video, record))
             in_real_time = options.realtime or not is_sequence(sequence)
+            input_recorder = _input_recorder(record_input, sequence)
             viewing = Viewing(
                 viewer or ViewerOptions(), sequence, interrupt.event, in_real_time=in_real_time
             )
@@ -106,26 +112,46 @@ def run_and_show(
                     command=shlex.join(["orbslam2py", *sys.argv[1:]]),
                     progress=progress,
                     control=viewing.control,
-                    watch=watch_all(viewing.watch, files.watch, publishing.watch),
+                    watch=watch_all(
+                        viewing.watch, files.watch, publishing.watch, lambda _: input_recorder
+                    ),
                 )
         tell_repeated()
         console.print(report_table(done.report))
-        folder = escape(str(done.folder))
-        console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
-        html = done.folder / "report.html" if done.folder is not None else None
-        if report_page and html is not None and html.is_file():
-            text = f"To look at them: [bold]{escape(str(html))}[/]"
-            console.print(text, highlight=False, soft_wrap=True)
+        _tell_folder(console, done, report_page=report_page)
         if options.save_map is not None:
             about_map = _about_map(done.result, options.save_map, there_before)
             console.print(about_map, highlight=False, soft_wrap=True)
         files.tell(console)
+        if record_input is not None and record_input.is_file():
+            what = f"What came in is in [bold]{escape(str(record_input))}[/]"
+            console.print(what, highlight=False, soft_wrap=True)
         code = _conclude(done, errors)
         viewing.stay(console, done.folder)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED
     return code
+
+
+def _input_recorder(
+    path: Path | None, source: Sequence | LiveSource
+) -> AbstractContextManager[object]:
+    """Make what records the input of a live source; it begins when it is entered."""
+    if path is None:
+        return contextlib.nullcontext()
+    from orbslam2py.live import InputRecorder  # noqa: PLC0415  # its packages may be missing
+
+    return InputRecorder(path, cast(LiveStream, source))
+
+
+def _tell_folder(console: Console, done: FinishedRun, *, report_page: bool) -> None:
+    folder = escape(str(done.folder))
+    console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+    html = done.folder / "report.html" if done.folder is not None else None
+    if report_page and html is not None and html.is_file():
+        text = f"To look at them: [bold]{escape(str(html))}[/]"
+        console.print(text, highlight=False, soft_wrap=True)
 
 
 def _remove_if_empty(folder: Path) -> None:

@@ -17,8 +17,9 @@ SequenceArgument = Annotated[
     typer.Argument(
         help="Folder of a TUM RGB-D, KITTI or EuRoC sequence; folder of images, or one that holds "
         "a folder of images and one of depth, or images of a left and a right camera; bag of "
-        "ROS 1 or ROS 2 (.bag, .db3, .mcap, or its folder); video file; number of a camera (ends "
-        "with Ctrl-C)."
+        "ROS 1 or ROS 2 (.bag, .db3, .mcap, or its folder); video file; live source (ends with "
+        "Ctrl-C): number of a camera, v4l:0, realsense:SERIAL, oak:ID, rtsp://HOST/PATH. "
+        "'orbslam2py devices' lists what is plugged in."
     ),
 ]
 SensorOption = Annotated[
@@ -69,6 +70,17 @@ SplitFlag = Annotated[
         "--split",
         help="Each image of a video, folder or camera holds two views side by side: the left half "
         "is the left one of a stereo pair.",
+    ),
+]
+ImuFlag = Annotated[
+    bool,
+    typer.Option("--imu", help="Take samples of the IMU from a live source that has one."),
+]
+RecordInputOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Write all images and samples of a live source into this file (.mcap), without loss. "
+        "'orbslam2py run FILE' repeats the run.",
     ),
 ]
 MaskOption = Annotated[

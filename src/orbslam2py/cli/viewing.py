@@ -17,6 +17,7 @@ from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.runs.latency import latency_words
 from orbslam2py.runs.result import DROPPED, FrameRow
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
@@ -139,9 +140,11 @@ class Viewing:
         return Publisher(system, [self._view], frame_rate=FRAME_RATE)
 
     def count(self, row: FrameRow) -> None:
-        """Take note of a frame that was dropped."""
+        """Take note of a frame: whether it was dropped, and how long it took."""
         if self._view is not None and row.reason == DROPPED:
             self._view.count_dropped()
+        if self._view is not None and row.latency is not None:
+            self._view.tell_latency(latency_words(row.latency))
 
     def stay(self, console: Console, folder: Path | None) -> None:
         """Keep the page until Ctrl-C, unless it is to end with the run."""

@@ -164,7 +164,9 @@ def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
 #: Attributes that not every sequence has: where its files are.
 _OF_SOME = frozenset({"path", "folder", "image_path"})
 #: Attributes that not every live source has: its device, IMU, losses, and whoever records it.
-_OF_LIVE = frozenset({"device", "has_imu", "imu_settings", "doubts", "counts", "set_tap"})
+_OF_LIVE = frozenset(
+    {"device", "has_imu", "imu_settings", "doubts", "counts", "set_tap", "is_split"}
+)
 
 
 class _Masked:

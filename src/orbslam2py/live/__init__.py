@@ -4,6 +4,7 @@
 from orbslam2py.live.camera import LiveCamera
 from orbslam2py.live.device import Device, FoundDevice, Request, Sink, Stream
 from orbslam2py.live.open_source import open_source
+from orbslam2py.live.recorder import InputRecorder
 from orbslam2py.live.registry import KINDS, Kind
 from orbslam2py.live.stream import LiveStream
 
@@ -11,6 +12,7 @@ __all__ = [
     "KINDS",
     "Device",
     "FoundDevice",
+    "InputRecorder",
     "Kind",
     "LiveCamera",
     "LiveStream",

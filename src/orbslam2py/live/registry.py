@@ -39,6 +39,8 @@ class Kind:
         What its images can be used for, the one by default first.
     has_topics
         Whether ``--topics`` goes with it.
+    can_be_listed
+        Whether its module has ``find_devices()`` for it: cameras with addresses cannot be found.
     """
 
     prefix: str
@@ -48,6 +50,7 @@ class Kind:
     extra: str | None = None
     sensors: tuple[Sensor, ...] = (Sensor.MONOCULAR,)
     has_topics: bool = False
+    can_be_listed: bool = True
 
     def open(self, request: Request) -> Device:
         """Make a device, without starting it.
@@ -115,12 +118,14 @@ KINDS: tuple[Kind, ...] = (
         "rtsp://HOST/PATH",
         "camera on the network",
         "orbslam2py.live.capture",
+        can_be_listed=False,
     ),
     Kind(
         "http",
         "http://HOST/PATH",
         "camera on the network that sends MJPEG",
         "orbslam2py.live.capture",
+        can_be_listed=False,
     ),
     Kind(
         "ros2",

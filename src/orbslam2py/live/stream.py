@@ -106,6 +106,8 @@ class LiveStream:
         self.imu_settings: ImuSettings | None = (
             device.imu_settings() if "imu" in device.streams else None
         )
+        #: Whether every image holds two views side by side.
+        self.is_split = split and self.sensor is Sensor.STEREO
         self._reports = Reports(device.name)
         rate = self.settings.camera.fps
         skew = _usual_skew(device.streams, rate) if max_skew is None else max_skew

@@ -16,7 +16,7 @@ import numpy as np
 
 from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
-from orbslam2py.datasets import Images, LiveSource, Sequence
+from orbslam2py.datasets import FrameTimes, Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.runs.prefetch import prefetch
 from orbslam2py.slam.frame_source import check_images
@@ -42,6 +42,10 @@ class FedFrame:
         The images; an exception if they could not be read.
     is_dropped
         Whether real time leaves no room for it.
+    imu
+        Samples of the IMU since the frame before, as `LiveFrame.imu` has them; None without.
+    times
+        When a live frame passed its stages; None if it is not known.
     """
 
     index: int
@@ -49,6 +53,8 @@ class FedFrame:
     text: str
     item: Images | Exception
     is_dropped: bool = False
+    imu: FloatArray | None = None
+    times: FrameTimes | None = None
 
 
 class RecordedFeed:
@@ -152,7 +158,11 @@ class LiveFeed:
                 if frame is not None:
                     check_images(frame.images, "the camera")
                     text = _time_text(frame.text, "the camera")
-                    yield FedFrame(index, frame.timestamp, text, frame.images)
+                    yield FedFrame(
+                        *(index, frame.timestamp, text, frame.images),
+                        imu=frame.imu,
+                        times=frame.times,
+                    )
                     index += 1
 
     def delay(self, seconds: float) -> None:

@@ -115,6 +115,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "tracked_fraction": n_tracked / n_frames if n_frames else 0.0,
         "skipped_frames": result.n_skipped,
         "dropped_frames": result.n_dropped,
+        "input": result.input_counts,
         "keyframes": len(result.keyframes),
         "map_points": len(result.snapshot.point_ids),
         "loaded_map": loaded_map_entry(options.load_map),

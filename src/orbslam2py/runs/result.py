@@ -33,6 +33,8 @@ class FrameRow:
     """None for a skipped or dropped frame."""
     reason: str
     """Why there is no pose; empty if there is one."""
+    latency: dict[str, float] | None = None
+    """Milliseconds by the stages of `runs.latency.LATENCY_STAGES`; None for a recording."""
 
     @property
     def state(self) -> str:
@@ -111,6 +113,8 @@ class RunResult:
     """Those of them that speak against the settings: of the lens, or of the depth images."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
+    input_counts: dict[str, float] | None = None
+    """What a live source counted: frames, losses, samples; None if it counts nothing."""
     is_live: bool = False
     """The images came from a camera."""
     saved_map: Path | None = None

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import logging
 import threading
 import time
@@ -12,12 +13,13 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._files import describe_error
+from orbslam2py._timing import StageStatistics
 from orbslam2py.datasets.base import Images, Layout, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, MapFileError, OrbSlamError
 from orbslam2py.maps.map_arrays import MapArrays
@@ -25,6 +27,7 @@ from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.kept_images import KeptImages
+from orbslam2py.runs.latency import latency_of
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.depth_check import doubt_of_tum_factor
@@ -36,6 +39,8 @@ from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
+#: Whether tracking takes samples of an IMU with the images.
+_TAKES_IMU = "imu" in inspect.signature(System.track).parameters
 
 #: Seconds between two looks at whether to stop.
 _WAIT_SLICE = 0.2
@@ -75,12 +80,18 @@ class SequenceRunner:
         self._vocabulary = vocabulary
         self._options = options
         self._watch: CalibrationWatch | None = None
+        self._latency = StageStatistics()
         self._feed: RecordedFeed | LiveFeed
         if is_sequence(sequence):
             indices = options.indices(len(sequence))
             self._feed = RecordedFeed(sequence, indices, realtime=options.realtime)
         else:
             options.check_for_camera()
+            if getattr(sequence, "has_imu", False) and not _TAKES_IMU:
+                _log.warning(
+                    "%s has an IMU, which tracking does not use; --record-input records it",
+                    sequence.name,
+                )
             self._feed = LiveFeed(cast(LiveSource, sequence), options.max_frames)
         self.result = RunResult(
             sequence=sequence,
@@ -214,6 +225,8 @@ class SequenceRunner:
             if result.is_live:
                 result.n_frames = len(result.rows)
                 result.n_lost_by_camera = self._feed.n_lost
+                counts = getattr(result.sequence, "counts", None)
+                result.input_counts = counts() if callable(counts) else None
 
     def _track(self, system: System, frame: FedFrame) -> FrameRow:
         if frame.is_dropped:
@@ -224,24 +237,28 @@ class SequenceRunner:
             return self._skip(frame, frame.item)
         begin = time.perf_counter()
         try:
-            record = self._call(system, frame.item, frame.timestamp)
+            record = self._call(system, frame.item, frame)
         except ImageError as error:
             return self._skip(frame, error, self._file_of(frame))
         finally:
             self.result.slam_seconds += time.perf_counter() - begin
+        latency = None if frame.times is None else latency_of(frame.times, time.monotonic())
+        if latency is not None:
+            self._latency.add(latency)
         if self._watch is not None:
             self._watch.look(frame.item)
         if self.result.kept_images is not None:
             self.result.kept_images.look(len(self.result.rows), frame.item.image, record)
-        return _row(frame, record, str(record.reason))
+        return replace(_row(frame, record, str(record.reason)), latency=latency)
 
-    def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
+    def _call(self, system: System, images: Images, frame: FedFrame) -> TrackingRecord:
         sensor = self._options.sensor
         second = images.right if sensor is Sensor.STEREO else images.depth
         if second is None and sensor is not Sensor.MONOCULAR:
             # Not a spoilt frame, which is skipped: all others lack it, too.
             raise DatasetError("the sequence delivers no second image for this sensor")
-        return system.track(images, timestamp)
+        samples: dict[str, Any] = {"imu": frame.imu} if _TAKES_IMU and frame.imu is not None else {}
+        return system.track(images, frame.timestamp, **samples)
 
     def _skip(self, frame: FedFrame, error: Exception, file: str = "") -> FrameRow:
         reason = describe_error(error)
@@ -337,7 +354,7 @@ class SequenceRunner:
         points = np.repeat(seen.ids, np.diff(seen.offsets))
         result.sightings = np.stack([points, seen.keyframes], axis=1)
         result.drawing = MapArrays.of(system.pipeline.back_end.map, main)
-        result.stages = system.stage_statistics()
+        result.stages = system.stage_statistics() | self._latency.summary()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations
         result.loops = system.loops

@@ -83,6 +83,7 @@ class LiveView:
         self._control: RunActions | None = None
         self._answers: dict[str, Callable[..., object]] = {}
         self._n_dropped = 0
+        self._latency = ""
         self._missed = False
         self._companion = Companion(
             host=host,
@@ -170,7 +171,7 @@ class LiveView:
             view,
             record=_light(view.record),
             earlier=tuple(_light(record) for record in view.earlier),
-            queue=replace(view.queue, n_dropped=self._n_dropped),
+            queue=replace(view.queue, n_dropped=self._n_dropped, latency=self._latency),
         )
         self._show("on_frame", shown, self._system.localization_mode)
 
@@ -212,6 +213,10 @@ class LiveView:
     def count_dropped(self) -> None:
         """An image was dropped before it came to the system."""
         self._n_dropped += 1
+
+    def tell_latency(self, text: str) -> None:
+        """Say below the next image how long the last one took from exposure to pose."""
+        self._latency = text
 
     def wait(self) -> None:
         """Keep the page until Ctrl-C, or until it is no more."""

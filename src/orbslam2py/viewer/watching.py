@@ -27,6 +27,8 @@ class QueueState:
     """Images that were never tracked: they were overtaken by the next one."""
     frames_per_second: float = 0.0
     """Images tracked, over the last second or so."""
+    latency: str = ""
+    """Time from exposure to pose of a live image lately, by stage; empty if it is not known."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,6 +127,13 @@ class Bag:
                 for place in file.places(channel)
             )
 
+    def attachment(self, name: str) -> str | None:
+        """Return the text of a file that is attached to an MCAP file; None if there is none."""
+        for file in self._files:
+            if isinstance(file, McapFile) and name in file.attachments:
+                return file.attachments[name].decode("utf-8", "replace")
+        return None
+
     def read(self, message: Message, most: int | None = None) -> bytes:
         """Read a message, or its first bytes."""
         return self._files[message.file].read(message.place, most)

@@ -29,9 +29,11 @@ from orbslam2py.errors import DatasetError
 
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _MESSAGE_INDEX = 2, 3, 4, 5, 6, 7
+_ATTACHMENT = 9
 _LEAD, _U16, _U32 = struct.Struct("<BQ"), struct.Struct("<H"), struct.Struct("<I")
 _CHUNK_LEAD = struct.Struct("<QQQII")
 _MESSAGE_LEAD = struct.Struct("<HIQQ")
+_U64 = struct.Struct("<Q")
 _INDEX_ENTRY = struct.Struct("<QQ")
 #: More than the head of any chunk is long.
 _CHUNK_HEAD = 256
@@ -68,6 +70,8 @@ class McapFile:
         self._cache = ChunkCache(self._load_chunk)
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, Channel] = {}
+        #: Bytes of the attached files by name.
+        self.attachments: dict[str, bytes] = {}
         #: By number of the channel: when recorded, chunk, where the record begins.
         self._entries: dict[int, list[tuple[int, int, int]]] = {}
         self._walk()
@@ -107,7 +111,7 @@ class McapFile:
             if operation == _MESSAGE_INDEX:
                 indexed = True
                 self._note_index(self._file.read(begin, size))
-            elif operation in (_SCHEMA, _CHANNEL):
+            elif operation in (_SCHEMA, _CHANNEL, _ATTACHMENT):
                 self._declare(operation, self._file.read(begin, size))
             elif operation == _MESSAGE:
                 number, _, recorded, _ = _MESSAGE_LEAD.unpack(
@@ -144,7 +148,17 @@ class McapFile:
         for recorded, offset in _INDEX_ENTRY.iter_unpack(data[6 : 6 + size]):
             entries.append((recorded, chunk, offset))
 
+    def _note_attachment(self, data: bytes) -> None:
+        times = 2 * _U64.size
+        name, media_type = _texts(data, times, 2)
+        begin = times + 2 * _U32.size + len(name.encode()) + len(media_type.encode())
+        length = _U64.unpack_from(data, begin)[0]
+        self.attachments[name] = data[begin + _U64.size : begin + _U64.size + length]
+
     def _declare(self, operation: int, data: bytes) -> None:
+        if operation == _ATTACHMENT:
+            self._note_attachment(data)
+            return
         if operation == _SCHEMA:
             self._schemas[_U16.unpack_from(data)[0]] = _texts(data, 2, 1)[0]
             return

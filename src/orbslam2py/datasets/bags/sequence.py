@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._depth_size import depth_size_problem
+from orbslam2py.datasets.bags.attached import attached_settings
 from orbslam2py.datasets.bags.bag import Bag, Message
 from orbslam2py.datasets.bags.depth_cameras import find_depth_camera
 from orbslam2py.datasets.bags.image_topics import ImageTopic
@@ -114,17 +115,22 @@ class BagSequence(FramesInOrder):
         return self.default_settings() if self._chosen is None else self._chosen
 
     def default_settings(self) -> Settings:
-        """Make settings of the CameraInfo in the bag.
+        """Make settings of the CameraInfo in the bag, or take those that are attached to it.
 
         Raises
         ------
         DatasetError
             If there is none, or it cannot be used.
+        SettingsError
+            If the attached settings are wrong.
         """
         return self._default_settings
 
     @cached_property
     def _default_settings(self) -> Settings:
+        attached = attached_settings(self._bag, self.sensor)
+        if attached is not None:
+            return attached
         fps = rate_of(self.timestamps, _USUAL_RATE)
         return settings_of_topics(self._bag, self.topics, self.sensor, self._frames, fps)
 

@@ -107,6 +107,7 @@ def time_section(story: Story) -> Markup:
         "times", "Times",
         stages.stage_table(frames), stages.histogram(frames),
         figures(run_plots.times_plot(story)),
+        stages.latency_table(story.run.report),
         stages.background_table(story.run.report),
     )  # fmt: skip
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.runs.latency import LATENCY_STAGES
 from orbslam2py.runs.report_page.explained import STAGES, STAGES_BESIDE
 from orbslam2py.runs.report_page.markup import Markup, element, join, table
 from orbslam2py.runs.report_page.round_numbers import round_ticks, short, tick_texts
@@ -70,16 +71,28 @@ def _box(ms: FloatArray, most: float, look: str) -> Markup:
 
 def background_table(report: dict[str, Any]) -> Markup | None:
     """Times of what runs beside tracking, from report.json; None without any."""
+    named = ("mapping", "loop", "adjustment")
+    return _figures_of(report, named, STAGES_BESIDE, "stage beside tracking")
+
+
+def latency_table(report: dict[str, Any]) -> Markup | None:
+    """Times from the exposure of a live image to its pose, from report.json; None without any."""
+    return _figures_of(report, ("latency",), LATENCY_STAGES, "from exposure to pose")
+
+
+def _figures_of(
+    report: dict[str, Any], named: tuple[str, ...], told: dict[str, str], title: str
+) -> Markup | None:
     rows: list[list[str | Markup]] = [
-        [join(element("b", name), element("small", STAGES_BESIDE.get(name, ""))),
+        [join(element("b", name), element("small", told.get(name, ""))),
          *(short(float(numbers[key])) for key in ("median", "mean", "p99")),
          str(numbers["count"])]
         for name, numbers in report.get("milliseconds", {}).items()
-        if name.startswith(("mapping", "loop", "adjustment"))
+        if name.startswith(named)
     ]  # fmt: skip
     if not rows:
         return None
-    head = ["stage beside tracking", "median [ms]", "mean [ms]", "99 % within [ms]", "how often"]
+    head = [title, "median [ms]", "mean [ms]", "99 % within [ms]", "how often"]
     return table(head, rows, class_="numbers")
 
 

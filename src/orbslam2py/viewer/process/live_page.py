@@ -206,7 +206,8 @@ class LivePage:
     def _show_status(self) -> None:
         view, model = self._view, self.page.model
         resting = f"{number_of(self._n_resting, 'other map')} at rest" if self._n_resting else ""
-        note = "\n".join(text for text in (self._error, resting, self._end) if text)
+        latency = "" if view is None else view.queue.latency
+        note = "\n".join(text for text in (self._error, latency, resting, self._end) if text)
         if view is None:
             self.page.left.show_status(None, note)
             return
