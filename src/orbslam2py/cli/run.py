@@ -9,6 +9,17 @@ import typer
 from rich.console import Console
 
 from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.publishing import (
+    MCAP,
+    BaseFrameOption,
+    BaseTransformOption,
+    FoxgloveFlag,
+    FoxgloveHost,
+    FoxglovePort,
+    PublishOption,
+    PublishOptions,
+    network_of,
+)
 from orbslam2py.cli.run_and_show import run_and_show
 from orbslam2py.cli.run_arguments import read_initial_pose
 from orbslam2py.cli.run_options import (
@@ -122,6 +133,12 @@ def run(
     seed: SeedOption = 0,
     video: VideoOption = None,
     record: RecordOption = None,
+    publish: PublishOption = None,
+    base_frame: BaseFrameOption = None,
+    base_transform: BaseTransformOption = None,
+    foxglove: FoxgloveFlag = False,
+    foxglove_port: FoxglovePort = None,
+    foxglove_host: FoxgloveHost = None,
     record_input: RecordInputOption = None,
     force: ForceFlag = False,
     no_report: NoReportFlag = False,
@@ -148,6 +165,16 @@ def run(
         )
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
+    for_foxglove = record is not None and record.suffix.lower() == MCAP
+    publishing = PublishOptions(
+        network_of(sequence, publish),
+        base_frame,
+        base_transform,
+        foxglove,
+        foxglove_port,
+        foxglove_host,
+        record if for_foxglove else None,
+    )
     loaded = None if load is None else MapFile(load)
     chosen: Settings | str | None = settings
     if loaded is not None and settings is None:
@@ -209,6 +236,7 @@ def run(
         viewer=look,
         video=video,
         record=record,
+        publish=publishing,
         record_input=record_input,
         inputs=[Path(given) for given in (sequence, settings, times, mask, vocabulary) if given],
         quiet=quiet,

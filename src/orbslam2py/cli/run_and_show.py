@@ -19,6 +19,7 @@ from orbslam2py.cli.display import Display, progress_bar, report_table
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.cli.messages import log_to, print_error, tell_repeated
+from orbslam2py.cli.publishing import Publishing, PublishOptions
 from orbslam2py.cli.targets import check_apart
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
@@ -48,6 +49,7 @@ def run_and_show(
     quiet: bool = False,
     video: Path | None = None,
     record: Path | None = None,
+    publish: PublishOptions | None = None,
     record_input: Path | None = None,
     inputs: Iterable[Path] = (),
 ) -> ExitCode:
@@ -83,6 +85,15 @@ def run_and_show(
                 viewer or ViewerOptions(), sequence, interrupt.event, in_real_time=in_real_time
             )
             page.enter_context(viewing)
+            publishing = page.enter_context(
+                Publishing(
+                    publish or PublishOptions(),
+                    sequence,
+                    in_time=in_real_time,
+                    map_path=options.save_map,
+                    output=output,
+                )
+            )
             with progress_bar(console) as bar:
                 display = Display(bar, n_frames)
 
@@ -92,7 +103,7 @@ def run_and_show(
                     files.count(row)
 
                 done = run_sequence(
-                    sequence,
+                    publishing.sequence,
                     options,
                     vocabulary=words,
                     output=output,
@@ -101,16 +112,13 @@ def run_and_show(
                     command=shlex.join(["orbslam2py", *sys.argv[1:]]),
                     progress=progress,
                     control=viewing.control,
-                    watch=watch_all(viewing.watch, files.watch, lambda _: input_recorder),
+                    watch=watch_all(
+                        viewing.watch, files.watch, publishing.watch, lambda _: input_recorder
+                    ),
                 )
         tell_repeated()
         console.print(report_table(done.report))
-        folder = escape(str(done.folder))
-        console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
-        html = done.folder / "report.html" if done.folder is not None else None
-        if report_page and html is not None and html.is_file():
-            text = f"To look at them: [bold]{escape(str(html))}[/]"
-            console.print(text, highlight=False, soft_wrap=True)
+        _tell_folder(console, done, report_page=report_page)
         if options.save_map is not None:
             about_map = _about_map(done.result, options.save_map, there_before)
             console.print(about_map, highlight=False, soft_wrap=True)
@@ -135,6 +143,15 @@ def _input_recorder(
     from orbslam2py.live import InputRecorder  # noqa: PLC0415  # its packages may be missing
 
     return InputRecorder(path, cast(LiveStream, source))
+
+
+def _tell_folder(console: Console, done: FinishedRun, *, report_page: bool) -> None:
+    folder = escape(str(done.folder))
+    console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+    html = done.folder / "report.html" if done.folder is not None else None
+    if report_page and html is not None and html.is_file():
+        text = f"To look at them: [bold]{escape(str(html))}[/]"
+        console.print(text, highlight=False, soft_wrap=True)
 
 
 def _remove_if_empty(folder: Path) -> None:

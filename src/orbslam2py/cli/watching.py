@@ -15,8 +15,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.cli.publishing import MCAP
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import OrbSlamError
+from orbslam2py.errors import OrbSlamError, OutputFileError
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow
@@ -39,10 +40,14 @@ VideoOption = Annotated[
 RecordOption = Annotated[
     Path | None,
     typer.Option(
-        help="Record images, map, plots and events for Rerun's viewer (needs orbslam2py[rerun]).",
+        help="Record images, map, plots and events for Rerun's viewer (.rrd, needs "
+        "orbslam2py[rerun]), or poses, map and images for Foxglove and ROS 2 (.mcap, needs "
+        "orbslam2py[foxglove]).",
         metavar="FILE.rrd",
     ),
 ]
+#: Ending of recordings for Rerun.
+_RRD = ".rrd"
 #: How fast a camera's video is played: what its images are repeated or left out for [1/s].
 _LIVE_RATE = 30.0
 #: Looks at the map a second, in real time.
@@ -88,7 +93,14 @@ class FileWatchers:
         self.files["video"] = path
 
     def add_recording(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
-        """Write a recording for Rerun."""
+        """Write a recording for Rerun; those for Foxglove are published, see `publishing`."""
+        if path.suffix.lower() == MCAP:
+            self.files["recording"] = path
+            return
+        if path.suffix.lower() != _RRD:
+            raise OutputFileError(
+                f"{path} does not end like a recording; name it with {_RRD} or {MCAP}"
+            )
         from orbslam2py.recordings.rerun_recorder import RerunRecorder  # noqa: PLC0415
 
         recorder = RerunRecorder(

@@ -127,6 +127,24 @@ KINDS: tuple[Kind, ...] = (
         "orbslam2py.live.capture",
         can_be_listed=False,
     ),
+    Kind(
+        "ros2",
+        "ros2:",
+        "topics of ROS 2 over DDS, of the domain in ROS_DOMAIN_ID or behind the colon",
+        "orbslam2py.ros.dds_source",
+        "ros2",
+        sensors=(Sensor.STEREO, Sensor.RGBD, Sensor.MONOCULAR),
+        has_topics=True,
+    ),
+    Kind(
+        "zenoh",
+        "zenoh:tcp/HOST:7447",
+        "topics of ROS 2 over Zenoh (rmw_zenoh), by the address of a router",
+        "orbslam2py.ros.zenoh_source",
+        "ros2",
+        sensors=(Sensor.STEREO, Sensor.RGBD, Sensor.MONOCULAR),
+        has_topics=True,
+    ),
 )
 
 

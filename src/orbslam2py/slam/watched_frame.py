@@ -60,6 +60,18 @@ class WatchedFrame:
         """Keypoints and matches."""
         return self.record.features or frame_features(self._frame, self._inliers)
 
+    def kept_pose(self) -> core.TrackedFrame | None:
+        """Copy the pose alone, which `core.follow_map` moves with the map; None if there is none.
+
+        The copy remains valid after the call.
+        """
+        if self._frame.T_cw is None:
+            return None
+        copy = core.TrackedFrame(self._frame.features)
+        copy.T_cw = self._frame.T_cw
+        copy.share_anchor(self._frame)
+        return copy
+
     def pixels(self) -> npt.NDArray[np.float32]:
         """Where the keypoints lie in the image as it came, (n, 2)."""
         return pixels_as_given(self._frame.features)

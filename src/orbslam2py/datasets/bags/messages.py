@@ -84,8 +84,15 @@ def read_head(content: bytes, kind: str, encoding: str) -> Head:
     return Head(seconds * _NANO + nanoseconds, frame, size)
 
 
-def read_message(content: bytes, kind: str, encoding: str) -> Any:
+def read_message(content: bytes, kind: str, encoding: str, store: Any = None) -> Any:
     """Read a message of a common type.
+
+    Parameters
+    ----------
+    content, kind, encoding
+        The message, its type, and how it is serialised.
+    store
+        Typestore of rosbags that has the type; by default that of the common types.
 
     Returns
     -------
@@ -99,7 +106,7 @@ def read_message(content: bytes, kind: str, encoding: str) -> Any:
     """
     serde = require("rosbags.serde")
     kind = TRANSFORMS[0] if kind in TRANSFORMS else kind
-    store = type_store(encoding)
+    store = type_store(encoding) if store is None else store
     read = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     try:
         return read(content, kind)

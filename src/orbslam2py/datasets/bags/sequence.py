@@ -18,20 +18,14 @@ from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._depth_size import depth_size_problem
 from orbslam2py.datasets.bags.attached import attached_settings
 from orbslam2py.datasets.bags.bag import Bag, Message
-from orbslam2py.datasets.bags.calibration import settings_of_camera, settings_of_pair
 from orbslam2py.datasets.bags.depth_cameras import find_depth_camera
 from orbslam2py.datasets.bags.image_topics import ImageTopic
 from orbslam2py.datasets.bags.imu import read_imu
-from orbslam2py.datasets.bags.infos import read_info
 from orbslam2py.datasets.bags.messages import read_message
-from orbslam2py.datasets.bags.pixels import (
-    decode_depth,
-    decode_image,
-    decode_pixels,
-    units_per_metre,
-)
+from orbslam2py.datasets.bags.pixels import decode_depth, decode_image, decode_pixels
 from orbslam2py.datasets.bags.poses import read_poses
-from orbslam2py.datasets.bags.realsense import camera_times, units_per_metre_of
+from orbslam2py.datasets.bags.realsense import camera_times
+from orbslam2py.datasets.bags.settings_of_topics import settings_of_topics
 from orbslam2py.datasets.bags.timing import (
     pair_messages,
     require_one_size,
@@ -40,7 +34,6 @@ from orbslam2py.datasets.bags.timing import (
     warn_of_gaps,
 )
 from orbslam2py.datasets.bags.topics import TopicChoice, parse_topics
-from orbslam2py.datasets.bags.transforms import Transforms, names_of_coordinates
 from orbslam2py.datasets.base import Images, choose_sensor, rate_of
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
@@ -138,25 +131,8 @@ class BagSequence(FramesInOrder):
         attached = attached_settings(self._bag, self.sensor)
         if attached is not None:
             return attached
-        left = read_info(self._bag, self.topics.left, self.topics.left_info, "info")
         fps = rate_of(self.timestamps, _USUAL_RATE)
-        if self.topics.right is not None:
-            right = read_info(self._bag, self.topics.right, self.topics.right_info, "right_info")
-            rectified = self.topics.left.is_rectified and self.topics.right.is_rectified
-            T = None
-            if left.P[0, 3] == right.P[0, 3]:  # each was calibrated alone
-                names = map(names_of_coordinates, self._streams, self._frames)
-                T = Transforms(self._bag).between(*reversed(list(names)))
-            return settings_of_pair(left, right, fps, rectified=rectified, T_right_left=T)
-        depth = self.topics.depth
-        units = None if depth is None else units_per_metre_of(self._bag, depth)
-        return settings_of_camera(
-            left,
-            self.sensor,
-            fps,
-            rectified=self.topics.left.is_rectified,
-            depth_factor=None if depth is None else units or units_per_metre(depth.encoding),
-        )
+        return settings_of_topics(self._bag, self.topics, self.sensor, self._frames, fps)
 
     def __len__(self) -> int:
         return len(self._nanoseconds)
