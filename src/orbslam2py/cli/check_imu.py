@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbslam2py._figures import check_picture_name
-from orbslam2py.calibration.imu_check import ImuReport, check_imu, draw_imu_check
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_table
 from orbslam2py.cli.messages import log_to
@@ -39,6 +38,7 @@ from orbslam2py.datasets import (
     open_input,
 )
 from orbslam2py.errors import DatasetError
+from orbslam2py.inertial.check import ImuReport, check_imu, draw_imu_check
 from orbslam2py.settings import ImuSettings, Sensor
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
