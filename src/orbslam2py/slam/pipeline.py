@@ -105,7 +105,10 @@ class Pipeline:
         )
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         self.tracking = _make_tracking(setup, back_end, options, config)
-        self.inertial = InertialInput(setup.imu)
+        in_time = not (options.deterministic or options.wait_for_mapping)
+        self.inertial = InertialInput(
+            setup.imu, back_end.events.worker.offer if in_time else _at_once
+        )
         self.localization = LocalizationSwitch(
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
@@ -376,6 +379,11 @@ class Pipeline:
             self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
             self.tracking.restart()
         return True
+
+
+def _at_once(work: Callable[[], None]) -> None:
+    """Do something now, where recorded images wait and results must be equal."""
+    work()
 
 
 def _make_search(
