@@ -214,7 +214,7 @@ class Pipeline:
             self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
-        self.inertial.look(interval, record)
+        self.inertial.look(interval, record, frame.big_change)
         self._announce(state_before, record)
         self.back_end.mapping.start()
         for watch in watchers:

@@ -248,6 +248,22 @@ def test_lost_frames_and_gaps_raise_no_alarm() -> None:
     assert check.verdict is ImuVerdict.FITS
 
 
+def test_a_map_that_is_turned_and_scaled_raises_no_alarm() -> None:
+    given = made(7)
+    check, buffer = ImuCheck(given.settings, lambda test: test()), ImuBuffer()
+    buffer.add(given.samples)
+    change = np.eye(4)
+    change[:3, :3] = cv2.Rodrigues(np.array([0.4, -0.3, 0.2]))[0]
+    for k, (t, T_wc) in enumerate(zip(given.t.tolist(), given.T_wc, strict=True)):
+        n = k // 40
+        for _ in range(n):
+            T_wc = change @ T_wc  # noqa: PLW2901
+            T_wc[:3, 3] *= 1.3
+        check.add(buffer.take(t), record(t, T_wc), n)
+        assert check.verdict is not ImuVerdict.HELD_BACK
+    assert check.verdict is ImuVerdict.FITS
+
+
 def test_the_settings_know_the_offset() -> None:
     given = made(6)
     shifted(0.2)(given)

@@ -46,6 +46,9 @@ _KNOWN_SIGN = 1.4
 #: Share of the samples at the end of the range, above which the range is too small.
 _SATURATED = 0.01
 
+#: Changes of a map that are told apart.
+_WORLDS = 1_000_000
+
 #: Runs a test, now or in another thread.
 Run = Callable[[Callable[[], None]], object]
 
@@ -125,16 +128,27 @@ class ImuCheck:
         """What the last test measured, such as the time offset; None before the first one."""
         return self._report
 
-    def add(self, interval: ImuInterval | None, record: TrackingRecord) -> None:
-        """Add what is known of a frame: the samples since the frame before, and its pose."""
+    def add(self, interval: ImuInterval | None, record: TrackingRecord, n_changes: int = 0) -> None:
+        """Add what is known of a frame.
+
+        Parameters
+        ----------
+        interval
+            Samples since the frame before.
+        record
+            Its pose; one that the IMU alone predicted counts as none.
+        n_changes
+            Number of times that the map as a whole was moved: poses before and after are not
+            compared with each other.
+        """
         if self._done:
             return
         if self._begins_anew:
             self._begins_anew = False
             self._forget()
         row = np.full(18, np.nan)
-        row[:2] = record.timestamp, record.map_index
-        T_wc = record.T_wc
+        row[:2] = record.timestamp, record.map_index * _WORLDS + n_changes % _WORLDS
+        T_wc = None if str(getattr(record, "method", "")) == "imu" else record.T_wc
         if T_wc is not None:
             row[2:] = T_wc.ravel()
         before, self._before = self._before, row
@@ -223,7 +237,7 @@ def compared(samples: FloatArray, poses: FloatArray, settings: ImuSettings) -> I
     samples
         Rows as `ImuSamples` has them, on the clock of the IMU.
     poses
-        One row for each frame: time stamp, number of the map, and ``T_wc`` row by row; NaN for a
+        One row for each frame: time stamp, number of the world, and ``T_wc`` row by row; NaN for a
         frame without a pose. (n, 18).
     settings
         The IMU beside the camera that the poses are of.
@@ -265,5 +279,5 @@ def _counts(fault: Finding, moving: bool) -> bool:
 
 
 def _follows(before: FloatArray, row: FloatArray) -> bool:
-    """Whether two frames in a row have poses in one map."""
+    """Whether two frames in a row have poses in one world."""
     return not np.isnan(before[2]) and before[1] == row[1] and row[0] - before[0] < _STEP

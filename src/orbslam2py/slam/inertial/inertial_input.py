@@ -64,11 +64,21 @@ class InertialInput:
         """Take the samples from the image before to this one; None without IMU settings."""
         return None if self.settings is None else self.buffer.take(timestamp)
 
-    def look(self, interval: ImuInterval | None, record: TrackingRecord) -> None:
-        """See what tracking made of an image, and of the samples since the image before."""
+    def look(self, interval: ImuInterval | None, record: TrackingRecord, n_changes: int) -> None:
+        """See what tracking made of an image, and of the samples since the image before.
+
+        Parameters
+        ----------
+        interval
+            As `take` gave it.
+        record
+            The image's pose.
+        n_changes
+            Number of times that the map as a whole was moved.
+        """
         self.interval = interval
         if self.check is not None:
-            self.check.add(interval, record)
+            self.check.add(interval, record, n_changes)
 
     def restart(self) -> None:
         """Begin anew: the next image has no image before it."""
