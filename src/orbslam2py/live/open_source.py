@@ -84,10 +84,6 @@ def open_source(
     is_there = not is_whole(source) and path_of(source, "what to open").exists()
     named = None if is_number or is_there else kind_of(text)
     if not (is_number or named) or is_there:
-        if imu:
-            raise DatasetError(
-                f"--imu is for a live source with an IMU, which {source} is not; leave it out"
-            )
         return open_recorded(
             *(path_of(source, "what to open"), sensor),
             settings=settings,

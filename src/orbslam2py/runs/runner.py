@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import logging
 import threading
 import time
@@ -13,7 +12,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
+from orbslam2py.runs.imu import find_imu, imu_entry
 from orbslam2py.runs.kept_images import KeptImages
 from orbslam2py.runs.latency import latency_of
 from orbslam2py.runs.options import RunOptions
@@ -39,11 +39,10 @@ from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
-#: Whether tracking takes samples of an IMU with the images.
-_TAKES_IMU = "imu" in inspect.signature(System.track).parameters
-
 #: Seconds between two looks at whether to stop.
 _WAIT_SLICE = 0.2
+#: Seconds that an image of a camera waits for the samples of the IMU up to its time.
+_IMU_PATIENCE = 0.1
 
 #: Called after every frame with the row and the system.
 Progress = Callable[[FrameRow, System], None]
@@ -82,16 +81,18 @@ class SequenceRunner:
         self._watch: CalibrationWatch | None = None
         self._latency = StageStatistics()
         self._feed: RecordedFeed | LiveFeed
+        self._imu = find_imu(
+            sequence,
+            options.imu,
+            options.imu_settings,
+            options.imu_samples,
+            is_live=not is_sequence(sequence),
+        )
         if is_sequence(sequence):
             indices = options.indices(len(sequence))
-            self._feed = RecordedFeed(sequence, indices, realtime=options.realtime)
+            self._feed = RecordedFeed(sequence, indices, realtime=options.realtime, imu=self._imu)
         else:
             options.check_for_camera()
-            if getattr(sequence, "has_imu", False) and not _TAKES_IMU:
-                _log.warning(
-                    "%s has an IMU, which tracking does not use; --record-input records it",
-                    sequence.name,
-                )
             self._feed = LiveFeed(cast(LiveSource, sequence), options.max_frames)
         self.result = RunResult(
             sequence=sequence,
@@ -147,6 +148,7 @@ class SequenceRunner:
             load_map=options.load_map,
             initial_pose=options.initial_pose,
             allow_other_setup=options.allow_other_setup,
+            imu=None if self._imu is None else self._imu.settings,
             **asdict(how),
         )
         if options.save_map is not None and options.autosave is not None:
@@ -173,6 +175,9 @@ class SequenceRunner:
         result.warnings += getattr(result.sequence, "doubts", ())  # logged when it was opened
         result.warnings += system.settings.doubts()  # which the system has logged
         self._judge_depth(system)
+        if system.imu_check is not None:
+            result.imu = imu_entry(system.imu_check, system.pipeline.inertial.n_samples)
+            result.warnings += [fault.text for fault in system.imu_check.faults]
         result.calibration_warnings = self._calibration_warnings(system)
         result.warnings += result.calibration_warnings
         self._collect(system)
@@ -229,15 +234,21 @@ class SequenceRunner:
                 result.input_counts = counts() if callable(counts) else None
 
     def _track(self, system: System, frame: FedFrame) -> FrameRow:
+        imu = None if self._imu is None else frame.imu
+        if imu is not None:
+            # Of every frame, also of those that are not tracked.
+            system.add_imu(imu)
         if frame.is_dropped:
             return _row(frame, None, DROPPED)
         if isinstance(frame.item, Exception):
             if not isinstance(frame.item, (OrbSlamError, OSError)):
                 raise frame.item
             return self._skip(frame, frame.item)
+        if imu is not None and self._feed.is_live:
+            system.wait_for_imu(frame.timestamp, _IMU_PATIENCE)
         begin = time.perf_counter()
         try:
-            record = self._call(system, frame.item, frame)
+            record = self._call(system, frame.item, frame.timestamp)
         except ImageError as error:
             return self._skip(frame, error, self._file_of(frame))
         finally:
@@ -251,14 +262,13 @@ class SequenceRunner:
             self.result.kept_images.look(len(self.result.rows), frame.item.image, record)
         return replace(_row(frame, record, str(record.reason)), latency=latency)
 
-    def _call(self, system: System, images: Images, frame: FedFrame) -> TrackingRecord:
+    def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
         sensor = self._options.sensor
         second = images.right if sensor is Sensor.STEREO else images.depth
         if second is None and sensor is not Sensor.MONOCULAR:
             # Not a spoilt frame, which is skipped: all others lack it, too.
             raise DatasetError("the sequence delivers no second image for this sensor")
-        samples: dict[str, Any] = {"imu": frame.imu} if _TAKES_IMU and frame.imu is not None else {}
-        return system.track(images, frame.timestamp, **samples)
+        return system.track(images, timestamp)
 
     def _skip(self, frame: FedFrame, error: Exception, file: str = "") -> FrameRow:
         reason = describe_error(error)
