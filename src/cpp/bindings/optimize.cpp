@@ -79,13 +79,26 @@ void bind_pose_optimization(py::module_& module) {
                     "perturbation, scaled by the residual variance. Zero: nothing estimated.")
       .def_readonly("iterations", &PoseEstimate::iterations, "Of all rounds together.");
 
+  py::class_<PosePrior>(module, "PosePrior",
+                        "Gaussian of a pose: `T_cw = exp(e) mean`, with `e` (rotation [rad],\n"
+                        "translation) of mean zero.")
+      .def(py::init([](const Pose& mean, const Matrix6d& information) {
+             return PosePrior{mean, information};
+           }),
+           "mean"_a, "information"_a,
+           "mean: Pose `T_cw`. information: (6, 6) float64, inverse of the covariance.")
+      .def_readonly("mean", &PosePrior::mean, "Pose `T_cw`.")
+      .def_readonly("information", &PosePrior::information, "(6, 6) float64.");
+
   module.def(
-      "optimize_pose", [](TrackedFrame& frame) { return optimize_pose(frame); }, "frame"_a,
-      py::call_guard<py::gil_scoped_release>(),
+      "optimize_pose",
+      [](TrackedFrame& frame, const PosePrior* prior) { return optimize_pose(frame, prior); },
+      "frame"_a, "prior"_a = py::none(), py::call_guard<py::gil_scoped_release>(),
       "Pose of a frame from its associated points, starting at its T_cw; writes T_cw and the\n"
       "outlier flags. Four rounds of damped least squares with a Huber kernel (off in the last);\n"
       "outliers are judged anew after each. Fewer than 3 associations: pose unchanged, no\n"
-      "inliers. Raises StateError when the frame has no pose.");
+      "inliers. With a prior (PosePrior) any number is enough, and the covariance is that of both\n"
+      "together. Raises StateError when the frame has no pose.");
   module.def(
       "pose_covariance", &pose_covariance, "frame"_a, py::call_guard<py::gil_scoped_release>(),
       "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"
