@@ -14,10 +14,11 @@ from orbslam2py.batches.names import key_of, label_of_parts
 from orbslam2py.batches.sweep import CONFIG_NAMES
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
+from orbslam2py.settings.imu_files import describes_imu, read_imu_settings
 from orbslam2py.slam.options import SystemOptions
 
 #: Options of a run that a batch may have.
-RUN_OPTIONS = ("start", "stride", "max_frames", "realtime", "final_adjustment")
+RUN_OPTIONS = ("start", "stride", "max_frames", "realtime", "final_adjustment", "imu")
 SYSTEM_OPTIONS = (
     *("deterministic", "loop_closing", "full_adjustment"),
     *("full_adjustment_time_limit", "check_calibration", "several_maps", "new_map_after", "effort"),
@@ -93,8 +94,14 @@ class Job:
             config={n: v for n, v in (*self.options, *self.parameters) if n in CONFIG_NAMES},
             **{name: given[name] for name in SYSTEM_OPTIONS if name in given},
         )
+        settings = None if self.settings is None else Path(self.settings)
+        describes = given.get("imu") is not False and settings and settings.is_file()
+        imu = read_imu_settings(settings) if describes and describes_imu(settings) else None
         return RunOptions(
-            sensor, system, **{name: given[name] for name in RUN_OPTIONS if name in given}
+            sensor,
+            system,
+            imu_settings=imu,
+            **{name: given[name] for name in RUN_OPTIONS if name in given},
         )
 
 

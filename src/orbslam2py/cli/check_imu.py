@@ -12,11 +12,15 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbslam2py._figures import check_picture_name
-from orbslam2py.calibration.imu_check import ImuReport, check_imu, draw_imu_check
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_table
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.run_options import (
+    AccelUnitOption,
     FpsOption,
+    GyroUnitOption,
+    ImuNoiseOption,
+    ImuSettingsOption,
     QuietFlag,
     SensorOption,
     SequenceArgument,
@@ -27,17 +31,15 @@ from orbslam2py.cli.run_options import (
 )
 from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.datasets import (
-    AccelUnit,
     FramesInOrder,
-    GyroUnit,
     IterableSequence,
     imu_of,
+    imu_settings_of,
     open_input,
-    read_imu_csv,
 )
-from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import ImuSettings, Sensor, imu_noise, read_imu_settings
-from orbslam2py.settings.imu_files import has_imu_keys
+from orbslam2py.errors import DatasetError
+from orbslam2py.inertial.check import ImuReport, check_imu, draw_imu_check
+from orbslam2py.settings import ImuSettings, Sensor
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
 
@@ -46,7 +48,7 @@ EXAMPLE = """
 
     orbslam2py check-imu MH_01_easy --sensor mono
 
-    orbslam2py check-imu phone.mp4 --imu samples.csv --gyro-unit deg/s --settings camera.yaml
+    orbslam2py check-imu phone.mp4 --imu-samples imu.csv --gyro-unit deg/s --settings camera.yaml
 
     orbslam2py check-imu drive --imu-settings camchain-imucam.yaml --imu-settings imu.yaml
 """
@@ -56,37 +58,20 @@ def check(
     sequence: SequenceArgument,
     sensor: SensorOption = None,
     settings: SettingsOption = None,
-    imu_settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="IMU settings of ORB-SLAM3, Kalibr, EuRoC or Basalt; twice for two files that "
-            "complete each other [those of --settings, or of the recording].",
-            metavar="FILE",
-        ),
-    ] = None,
-    imu_chip: Annotated[
-        str | None,
-        typer.Option(
-            "--imu-noise",
-            help="Name of the chip, such as bmi088, if the files do not tell the noise.",
-            metavar="CHIP",
-        ),
-    ] = None,
+    imu_settings: ImuSettingsOption = None,
+    imu_chip: ImuNoiseOption = None,
     imu: Annotated[
         Path | None,
         typer.Option(
+            "--imu-samples",
+            "--imu",
             help="Table with the samples: time, gyro x y z, accelerometer x y z [those of the "
             "recording].",
             metavar="FILE",
         ),
     ] = None,
-    gyro_unit: Annotated[
-        GyroUnit | None, typer.Option(help="Unit of the gyro in --imu [its header, or rad/s].")
-    ] = None,
-    accel_unit: Annotated[
-        AccelUnit | None,
-        typer.Option(help="Unit of the accelerometer in --imu [its header, or m/s^2]."),
-    ] = None,
+    gyro_unit: GyroUnitOption = None,
+    accel_unit: AccelUnitOption = None,
     fps: FpsOption = None,
     times: TimesOption = None,
     topics: TopicsOption = None,
@@ -109,10 +94,7 @@ def check(
     Exit code 0 if it fits, 1 if a fault was found, 2 if the input is wrong.
     """
     log_to(Console(stderr=True), quiet=quiet)
-    if imu is None and (gyro_unit or accel_unit):
-        raise SettingsError(
-            "--gyro-unit and --accel-unit are for the table of --imu; give it, or leave them out"
-        )
+    check_units(imu, gyro_unit, accel_unit)
     if plot is not None:
         check_picture_name(plot, "--plot")
         check_apart({"--plot": plot}, [] if imu is None else [imu])
@@ -122,15 +104,12 @@ def check(
         raise DatasetError(
             f"{sequence} is a camera, whose IMU is not read; record it first, and check that"
         )
-    samples = (
-        imu_of(images)
-        if imu is None
-        else read_imu_csv(imu, gyro_unit=gyro_unit, accel_unit=accel_unit)
-    )
+    given = read_table(imu, gyro_unit, accel_unit)
+    samples = imu_of(images) if given is None else given
     if samples is None:
         raise DatasetError(
-            f"{sequence} has no samples of an IMU; give a table with --imu FILE (time, gyro x y z, "
-            "accelerometer x y z)"
+            f"{sequence} has no samples of an IMU; give a table with --imu-samples FILE "
+            "(time, gyro x y z, accelerometer x y z)"
         )
     believed = _believed(images, settings, imu_settings, imu_chip)
     paths = _tracked(images, vocabulary, seconds)
@@ -148,14 +127,9 @@ def _believed(
     images: IterableSequence, settings: str | None, files: list[str] | None, chip: str | None
 ) -> ImuSettings | None:
     """The IMU settings for the camera of the images; None if there are none."""
-    noise = None if chip is None else imu_noise(chip)
-    found: ImuSettings | None = None
-    if files:
-        found = read_imu_settings(*files, noise=noise)
-    elif settings is not None and Path(settings).is_file() and has_imu_keys(Path(settings)):
-        found = read_imu_settings(settings, noise=noise)
-    elif (of_recording := getattr(images, "imu_settings", None)) is not None:
-        found = of_recording()
+    found = imu_settings_given(settings, files, chip)
+    if found is None:
+        found = imu_settings_of(images)
     rectification = images.settings.rectification
     if found is None or images.sensor is not Sensor.STEREO or rectification is None:
         return found

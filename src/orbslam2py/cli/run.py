@@ -8,10 +8,12 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_table
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.run_and_show import run_and_show
 from orbslam2py.cli.run_arguments import read_initial_pose
 from orbslam2py.cli.run_options import (
+    AccelUnitOption,
     AllowOtherSetupFlag,
     AutosaveOption,
     DeterministicFlag,
@@ -21,6 +23,11 @@ from orbslam2py.cli.run_options import (
     FpsOption,
     FullAdjustmentFlag,
     FullAdjustmentTimeLimitOption,
+    GyroUnitOption,
+    ImuFlag,
+    ImuNoiseOption,
+    ImuSamplesOption,
+    ImuSettingsOption,
     InitialPoseOption,
     LoadOption,
     LocalizeOption,
@@ -98,6 +105,12 @@ def run(
     mask: MaskOption = None,
     topics: TopicsOption = None,
     split: SplitFlag = False,
+    imu: ImuFlag = None,
+    imu_settings: ImuSettingsOption = None,
+    imu_noise: ImuNoiseOption = None,
+    imu_samples: ImuSamplesOption = None,
+    gyro_unit: GyroUnitOption = None,
+    accel_unit: AccelUnitOption = None,
     load: LoadOption = None,
     initial_pose: InitialPoseOption = None,
     allow_other_setup: AllowOtherSetupFlag = False,
@@ -139,6 +152,7 @@ def run(
             "--full-adjustment-time-limit limits full adjustments, and this run makes none; leave "
             "it out, or take --final-adjustment"
         )
+    check_units(imu_samples, gyro_unit, accel_unit)
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     loaded = None if load is None else MapFile(load)
@@ -185,6 +199,11 @@ def run(
         allow_other_setup=allow_other_setup,
         save_map=save,
         autosave=autosave,
+        imu=imu,
+        imu_settings=(
+            None if imu is False else imu_settings_given(settings, imu_settings, imu_noise)
+        ),
+        imu_samples=read_table(imu_samples, gyro_unit, accel_unit),
     )
     code = run_and_show(
         images,
@@ -196,7 +215,14 @@ def run(
         viewer=look,
         video=video,
         record=record,
-        inputs=[Path(given) for given in (sequence, settings, times, mask, vocabulary) if given],
+        inputs=[
+            Path(given)
+            for given in (
+                *(sequence, settings, times, mask, vocabulary, imu_samples),
+                *(imu_settings or ()),
+            )
+            if given
+        ],
         quiet=quiet,
     )
     raise typer.Exit(code)

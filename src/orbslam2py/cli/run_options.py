@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from orbslam2py.datasets import AccelUnit, GyroUnit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.effort import Effort
 
@@ -76,6 +77,47 @@ MaskOption = Annotated[
     typer.Option(
         help="Image parts to use: an 8-bit image, 0 = ignore, or a folder with one per image.",
         metavar="FILE_OR_FOLDER",
+    ),
+]
+ImuFlag = Annotated[
+    bool | None,
+    typer.Option(
+        "--imu/--no-imu",
+        help="Use the samples of an IMU, or do not [if the recording has samples and settings of "
+        "its IMU].",
+        show_default=False,
+    ),
+]
+ImuSettingsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="IMU settings of ORB-SLAM3, Kalibr, EuRoC or Basalt; twice for two files that "
+        "complete each other [those of --settings, or of the recording].",
+        metavar="FILE",
+    ),
+]
+ImuNoiseOption = Annotated[
+    str | None,
+    typer.Option(
+        "--imu-noise",
+        help="Name of the chip, such as bmi088, if the files do not tell the noise.",
+        metavar="CHIP",
+    ),
+]
+GyroUnitOption = Annotated[
+    GyroUnit | None,
+    typer.Option(help="Unit of the gyro in that table [its header, or rad/s]."),
+]
+AccelUnitOption = Annotated[
+    AccelUnit | None,
+    typer.Option(help="Unit of the accelerometer in that table [its header, or m/s^2]."),
+]
+ImuSamplesOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Table with the samples of the IMU: time, gyro x y z, accelerometer x y z [those of "
+        "the recording].",
+        metavar="FILE",
     ),
 ]
 RealtimeFlag = Annotated[

@@ -16,7 +16,7 @@ from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
-from orbslam2py.datasets.imu import ImuSamples, imu_of
+from orbslam2py.datasets.imu import ImuSamples, imu_of, imu_settings_of
 from orbslam2py.datasets.imu_csv import AccelUnit, GyroUnit, read_imu_csv
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.layouts import (
@@ -71,6 +71,7 @@ __all__ = [
     "VideoReader",
     "VideoSequence",
     "imu_of",
+    "imu_settings_of",
     "is_recording",
     "open_input",
     "open_sequence",

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -82,12 +83,31 @@ class Frame:
         The time stamp in decimal seconds, with all digits of the source.
     images
         What the camera saw, as the tracking calls take it.
+    read_imu
+        Reads the samples for `imu`; None without an IMU.
     """
 
     index: int
     timestamp: float
     text: str
     images: Images
+    read_imu: Callable[[], FloatArray | None] | None = field(
+        default=None, repr=False, compare=False
+    )
+
+    @cached_property
+    def imu(self) -> FloatArray | None:
+        """Samples of the IMU since the frame before, float64 (n, 7); None without an IMU.
+
+        Rows as `ImuSamples` has them, up to the first one that is not before the frame. The
+        recording is read when they are asked for.
+
+        Raises
+        ------
+        DatasetError
+            If the samples of the recording cannot be read.
+        """
+        return None if self.read_imu is None else self.read_imu()
 
 
 class Source(Protocol):
@@ -142,11 +162,15 @@ class LiveFrame:
         The time stamp in decimal seconds.
     images
         The image, with its mask if there is one.
+    imu
+        Samples of an IMU since the frame before, float64 (n, 7), as `ImuSamples` has them; None
+        without an IMU.
     """
 
     timestamp: float
     text: str
     images: Images
+    imu: FloatArray | None = None
 
 
 class LiveSource(Source, Protocol):

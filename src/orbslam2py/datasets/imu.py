@@ -1,67 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Samples of an IMU: their array, and what was wrong with them."""
+"""Sequences that have samples of an IMU."""
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import numpy as np
+from orbslam2py.inertial.samples import ImuSamples, joined_streams, make_samples
+from orbslam2py.settings import ImuSettings
 
-from orbslam2py._arrays import EqualByValue, FloatArray
-from orbslam2py.errors import DatasetError
-
-_log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class ImuSamples(EqualByValue):
-    """Readings of a gyro and an accelerometer, in the frame of the IMU.
-
-    Attributes
-    ----------
-    source
-        Where they are from, for messages.
-    data
-        Rows ``[t, gx, gy, gz, ax, ay, az]``, float64 (n, 7), read-only: seconds, growing; angular
-        rate [rad/s]; specific force [m/s^2], which points up at rest.
-    doubts
-        What was changed in them, one sentence each; these were logged as warnings.
-    """
-
-    source: str
-    data: FloatArray
-    doubts: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.data)
-
-    @property
-    def timestamps(self) -> FloatArray:
-        """Time of every sample in seconds, float64 (n,)."""
-        return self.data[:, 0]
-
-    @property
-    def gyro(self) -> FloatArray:
-        """Angular rate in rad/s, float64 (n, 3)."""
-        return self.data[:, 1:4]
-
-    @property
-    def accel(self) -> FloatArray:
-        """Specific force in m/s^2, float64 (n, 3)."""
-        return self.data[:, 4:]
-
-    @property
-    def rate(self) -> float:
-        """Samples per second by the usual step."""
-        return float(1.0 / np.median(np.diff(self.timestamps)))
-
-    def between(self, begin: float, end: float) -> FloatArray:
-        """Return the rows of an interval [s], with one sample beyond each end if there is one."""
-        first = max(0, int(np.searchsorted(self.timestamps, begin, side="right")) - 1)
-        last = int(np.searchsorted(self.timestamps, end, side="left")) + 1
-        return self.data[first:last]
+__all__ = [
+    "ImuSamples",
+    "WithImu",
+    "imu_of",
+    "imu_settings_of",
+    "joined_streams",
+    "make_samples",
+]
 
 
 @runtime_checkable
@@ -94,76 +48,14 @@ def imu_of(sequence: object) -> ImuSamples | None:
     return sequence.imu() if isinstance(sequence, WithImu) else None
 
 
-def make_samples(source: str, data: FloatArray) -> ImuSamples:
-    """Sort samples, leave out what is not finite or doubled, and log how many these were.
-
-    Parameters
-    ----------
-    source
-        Where they are from, for messages.
-    data
-        Rows as `ImuSamples` has them, float64 (n, 7), in any order.
+def imu_settings_of(sequence: object) -> ImuSettings | None:
+    """Read what comes with a sequence about its IMU; None if nothing does.
 
     Raises
     ------
-    DatasetError
-        If fewer than two samples are left.
+    SettingsError
+        If there are settings that are wrong.
     """
-    doubts: list[str] = []
-
-    def say(count: int, text: str) -> None:
-        if count:
-            doubts.append(f"{source}: {count} of {len(data)} samples {text}")
-
-    finite = np.isfinite(data).all(axis=1)
-    say(int((~finite).sum()), "of the IMU are not finite and were left out")
-    rows = data[finite]
-    backwards = int((np.diff(rows[:, 0]) < 0).sum())
-    if backwards:
-        rows = rows[np.argsort(rows[:, 0], kind="stable")]
-    say(backwards, "of the IMU come before their predecessor in time; they were sorted")
-    new = np.ones(len(rows), dtype=bool)
-    new[1:] = np.diff(rows[:, 0]) > 0
-    say(int((~new).sum()), "of the IMU repeat the time of another; the first of each was kept")
-    rows = np.ascontiguousarray(rows[new])
-    if len(rows) < 2:
-        raise DatasetError(
-            f"{source} holds {len(rows)} usable samples of the IMU; give a file with its samples, "
-            "or take it away"
-        )
-    for doubt in doubts:
-        _log.warning("%s", doubt)
-    rows.setflags(write=False)
-    return ImuSamples(source, rows, tuple(doubts))
-
-
-def joined_streams(source: str, gyro: FloatArray, accel: FloatArray) -> ImuSamples:
-    """Put two streams together: the accelerometer is interpolated at the times of the gyro.
-
-    Parameters
-    ----------
-    source
-        Where they are from, for messages.
-    gyro, accel
-        Rows of time [s] and reading, float64 (n, 4). Samples of the gyro that no two of the
-        accelerometer enclose are left out.
-
-    Raises
-    ------
-    DatasetError
-        If the streams have no time in common.
-    """
-    streams = []
-    for name, stream in (("gyro", gyro), ("accelerometer", accel)):
-        padded = np.zeros((len(stream), 7))
-        padded[:, :4] = stream
-        streams.append(make_samples(f"{source} ({name})", padded).data[:, :4])
-    (t, g), (t_a, a) = ((rows[:, 0], rows[:, 1:]) for rows in streams)
-    inside = (t >= t_a[0]) & (t <= t_a[-1])
-    if inside.sum() < 2:
-        raise DatasetError(
-            f"{source}: gyro ({t[0]:.3f} s to {t[-1]:.3f} s) and accelerometer ({t_a[0]:.3f} s to "
-            f"{t_a[-1]:.3f} s) have no time in common; give streams of one recording"
-        )
-    at = np.column_stack([np.interp(t[inside], t_a, a[:, k]) for k in range(3)])
-    return make_samples(source, np.column_stack([t[inside], g[inside], at]))
+    read = getattr(sequence, "imu_settings", None)
+    found = read() if callable(read) else None
+    return found if isinstance(found, ImuSettings) else None

@@ -15,8 +15,10 @@ from orbslam2py.datasets.base import Images, LiveFrame, LiveSource, Sequence
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.imu import imu_of, imu_settings_of
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings import Sensor, Settings
+from orbslam2py.inertial.samples import ImuSamples
+from orbslam2py.settings import ImuSettings, Sensor, Settings
 from orbslam2py.trajectory import Trajectory
 
 
@@ -233,6 +235,14 @@ class MaskedSequence(FramesInOrder, _Masked):
 
     def __len__(self) -> int:
         return len(self._sequence)
+
+    def imu(self) -> ImuSamples | None:
+        """Read the samples of the IMU; None if the sequence has none."""
+        return imu_of(self._sequence)
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read what comes with the sequence about its IMU; None if nothing does."""
+        return imu_settings_of(self._sequence)
 
     def __getattr__(self, name: str) -> Any:
         # What only some sequences tell: `path` or `folder`, and `image_path`.

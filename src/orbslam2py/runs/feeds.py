@@ -18,6 +18,7 @@ from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError
+from orbslam2py.runs.imu import ImuOfRun
 from orbslam2py.runs.prefetch import prefetch
 from orbslam2py.slam.frame_source import check_images
 
@@ -42,6 +43,9 @@ class FedFrame:
         The images; an exception if they could not be read.
     is_dropped
         Whether real time leaves no room for it.
+    imu
+        Samples of the IMU since the frame before, float64 (n, 7), also of a dropped frame; None
+        without an IMU.
     """
 
     index: int
@@ -49,6 +53,7 @@ class FedFrame:
     text: str
     item: Images | Exception
     is_dropped: bool = False
+    imu: FloatArray | None = None
 
 
 class RecordedFeed:
@@ -62,6 +67,8 @@ class RecordedFeed:
         Places in the sequence of the frames to take, in order.
     realtime : bool
         Play the time stamps, and drop frames that are overtaken.
+    imu : ImuOfRun, optional
+        The IMU whose samples come with the frames.
 
     Raises
     ------
@@ -72,8 +79,16 @@ class RecordedFeed:
     is_live = False
     n_lost = 0
 
-    def __init__(self, sequence: Sequence, indices: list[int], *, realtime: bool) -> None:
+    def __init__(
+        self,
+        sequence: Sequence,
+        indices: list[int],
+        *,
+        realtime: bool,
+        imu: ImuOfRun | None = None,
+    ) -> None:
         self._sequence = sequence
+        self._imu = imu
         self._indices = indices
         self._realtime = realtime
         self._clock: _Clock | None = None
@@ -94,6 +109,7 @@ class RecordedFeed:
         sequence = self._sequence
         clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
         self._clock = clock
+        before: float | None = None
         with contextlib.closing(prefetch(sequence.load, self._indices, stop)) as images:
             for position, (index, item) in enumerate(images):
                 dropped = clock is not None and clock.must_drop(position)
@@ -102,7 +118,9 @@ class RecordedFeed:
                 if not isinstance(item, Exception):
                     check_images(item, f"load({index})")
                 timestamp = float(sequence.timestamps[index])
-                yield FedFrame(index, timestamp, self._text(index), item, dropped)
+                samples = None if self._imu is None else self._imu.since(before, timestamp)
+                before = timestamp
+                yield FedFrame(index, timestamp, self._text(index), item, dropped, samples)
 
     def _text(self, index: int) -> str:
         return _time_text(self._sequence.timestamp_text(index), f"timestamp_text({index})")
@@ -152,7 +170,8 @@ class LiveFeed:
                 if frame is not None:
                     check_images(frame.images, "the camera")
                     text = _time_text(frame.text, "the camera")
-                    yield FedFrame(index, frame.timestamp, text, frame.images)
+                    samples = getattr(frame, "imu", None)
+                    yield FedFrame(index, frame.timestamp, text, frame.images, imu=samples)
                     index += 1
 
     def delay(self, seconds: float) -> None:

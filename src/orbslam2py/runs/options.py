@@ -12,9 +12,11 @@ from orbslam2py._arguments import choice_of, is_number, is_whole, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.inertial.samples import ImuSamples
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
 
@@ -63,6 +65,13 @@ class RunOptions:
     """Save the maps in this file at the end."""
     autosave: float | None = None
     """Interval at which the maps are also saved during the run, seconds."""
+    imu: bool | None = None
+    """Whether the samples of an IMU go into the system; None: if the recording has samples and
+    something tells its settings."""
+    imu_settings: ImuSettings | None = None
+    """The IMU beside the unrectified (left) camera; by default what comes with the recording."""
+    imu_samples: ImuSamples | None = None
+    """Its samples; by default those of the recording."""
 
     if TYPE_CHECKING:  # text is taken for a sensor, which the type of the field cannot say
 
@@ -81,6 +90,9 @@ class RunOptions:
             allow_other_setup: bool = False,
             save_map: Path | None = None,
             autosave: float | None = None,
+            imu: bool | None = None,
+            imu_settings: ImuSettings | None = None,
+            imu_samples: ImuSamples | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -89,6 +101,12 @@ class RunOptions:
             raise SettingsError(f"system is {shown(self.system)}; give SystemOptions(...)")
         for name in _SWITCHES:
             object.__setattr__(self, name, choice_of(getattr(self, name), name))
+        if self.imu is not None:
+            object.__setattr__(self, "imu", choice_of(self.imu, "imu"))
+        for name, kind in (("imu_settings", ImuSettings), ("imu_samples", ImuSamples)):
+            given = getattr(self, name)
+            if not (given is None or isinstance(given, kind)):
+                raise SettingsError(f"{name} is {shown(given)}; give {kind.__name__}(...)")
         for name, least in _LEAST.items():
             object.__setattr__(self, name, _count_of(getattr(self, name), name, least))
         if self.autosave is not None and not is_number(self.autosave):
@@ -96,6 +114,12 @@ class RunOptions:
         self._check_together()
 
     def _check_together(self) -> None:
+        given = self.imu_settings is not None or self.imu_samples is not None
+        if self.imu is False and given:
+            raise DatasetError(
+                "--no-imu leaves the IMU out, but its settings or samples are given; leave out one "
+                "of them (imu, imu_settings, imu_samples)"
+            )
         if self.system.deterministic and self.realtime:
             raise DatasetError(
                 "--deterministic and --realtime exclude each other: dropping frames depends on "

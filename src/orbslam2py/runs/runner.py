@@ -24,6 +24,7 @@ from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
+from orbslam2py.runs.imu import find_imu
 from orbslam2py.runs.kept_images import KeptImages
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
@@ -39,6 +40,8 @@ _log = logging.getLogger(__name__)
 
 #: Seconds between two looks at whether to stop.
 _WAIT_SLICE = 0.2
+#: Seconds that an image of a camera waits for the samples of the IMU up to its time.
+_IMU_PATIENCE = 0.1
 
 #: Called after every frame with the row and the system.
 Progress = Callable[[FrameRow, System], None]
@@ -76,9 +79,16 @@ class SequenceRunner:
         self._options = options
         self._watch: CalibrationWatch | None = None
         self._feed: RecordedFeed | LiveFeed
+        self._imu = find_imu(
+            sequence,
+            options.imu,
+            options.imu_settings,
+            options.imu_samples,
+            is_live=not is_sequence(sequence),
+        )
         if is_sequence(sequence):
             indices = options.indices(len(sequence))
-            self._feed = RecordedFeed(sequence, indices, realtime=options.realtime)
+            self._feed = RecordedFeed(sequence, indices, realtime=options.realtime, imu=self._imu)
         else:
             options.check_for_camera()
             self._feed = LiveFeed(cast(LiveSource, sequence), options.max_frames)
@@ -136,6 +146,7 @@ class SequenceRunner:
             load_map=options.load_map,
             initial_pose=options.initial_pose,
             allow_other_setup=options.allow_other_setup,
+            imu=None if self._imu is None else self._imu.settings,
             **asdict(how),
         )
         if options.save_map is not None and options.autosave is not None:
@@ -216,12 +227,18 @@ class SequenceRunner:
                 result.n_lost_by_camera = self._feed.n_lost
 
     def _track(self, system: System, frame: FedFrame) -> FrameRow:
+        imu = None if self._imu is None else frame.imu
+        if imu is not None:
+            # Of every frame, also of those that are not tracked.
+            system.add_imu(imu)
         if frame.is_dropped:
             return _row(frame, None, DROPPED)
         if isinstance(frame.item, Exception):
             if not isinstance(frame.item, (OrbSlamError, OSError)):
                 raise frame.item
             return self._skip(frame, frame.item)
+        if imu is not None and self._feed.is_live:
+            system.wait_for_imu(frame.timestamp, _IMU_PATIENCE)
         begin = time.perf_counter()
         try:
             record = self._call(system, frame.item, frame.timestamp)

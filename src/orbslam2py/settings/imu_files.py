@@ -85,6 +85,15 @@ def has_imu_keys(path: Path) -> bool:
         return False
 
 
+def describes_imu(path: Path) -> bool:
+    """Whether a settings file tells noise and place of an IMU; parts of that are not enough."""
+    try:
+        found = _statements_of(path)
+    except SettingsError:
+        return False
+    return all(name in found for name in _NOISE) and ("T_ci" in found or "T_bc" in found)
+
+
 def _files_of(paths: tuple[str | PathLike[str], ...]) -> list[Path]:
     files: list[Path] = []
     for path in map(Path, paths):

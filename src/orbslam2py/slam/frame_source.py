@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -47,12 +47,22 @@ class Recording(Protocol):
     def load(self, index: int, /) -> SomeImages: ...  # noqa: D102
 
 
+class TimedImages(NamedTuple):
+    """Images with their time [s], and the samples of the IMU since the images before."""
+
+    timestamp: float
+    images: SomeImages
+    imu: Any = None
+
+
 #: A sequence, or whatever gives frames: a camera, a generator, a part of a sequence.
 FrameSource = Recording | Iterable[SomeFrame]
 
 
-def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, SomeImages]]:
-    """Yield time stamps and images.
+def timed_images(
+    source: FrameSource, sensor: Sensor, *, with_imu: bool = False
+) -> Iterator[TimedImages]:
+    """Yield images and time stamps.
 
     Parameters
     ----------
@@ -60,6 +70,8 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
         Where they come from.
     sensor
         What the images are needed for.
+    with_imu
+        Also take the samples of the frames' ``imu``, if they have it.
 
     Raises
     ------
@@ -88,12 +100,13 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
                     "orbslam2py.datasets.Frame"
                 )
             check_images(frame.images, "a frame")
-            yield frame.timestamp, frame.images
+            samples = getattr(frame, "imu", None) if with_imu else None
+            yield TimedImages(frame.timestamp, frame.images, samples)
     else:
         for index, timestamp in enumerate(source.timestamps.tolist()):
             images = source.load(index)
             check_images(images, f"load({index})")
-            yield timestamp, images
+            yield TimedImages(timestamp, images)
 
 
 def check_images(images: object, giver: str) -> None:

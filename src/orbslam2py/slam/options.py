@@ -11,11 +11,13 @@ from typing import Any
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import choice_of, is_finite, member_of, pose_of, seed_of, shown
+from orbslam2py._arguments import choice_of, is_finite, member_of, path_of, pose_of, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
+from orbslam2py.settings.imu import ImuSettings
+from orbslam2py.settings.imu_files import describes_imu, read_imu_settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.config import PRESETS, Config, value_of
@@ -112,6 +114,8 @@ class Setup:
     loaded: SavedMap | MapFile | None
     initial_pose: core.Pose | None
     """``T_cw`` where the camera may be in the loaded map."""
+    imu: ImuSettings | None = None
+    """The IMU beside the camera that is tracked, which for a rectified pair is turned."""
 
     @classmethod
     def of(
@@ -122,6 +126,7 @@ class Setup:
         map_to_load: SavedMap | MapFile | str | Path | None,
         initial_T_wc: npt.ArrayLike | None,
         allow_other: bool,
+        imu: ImuSettings | str | Path | None = None,
     ) -> Setup:
         """Put together what was given and what the map brings; `System` describes the arguments."""
         if map_to_load is None or isinstance(map_to_load, (SavedMap, MapFile)):
@@ -140,6 +145,8 @@ class Setup:
             settings = loaded.settings
         if loaded is not None:
             check_sensor(loaded, sensor)
+        if imu is None and not isinstance(settings, Settings):
+            imu = _imu_of_file(settings)
         settings = resolve_settings(settings, sensor)
         words = (
             vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
@@ -150,7 +157,33 @@ class Setup:
             check_vocabulary(loaded, words, name)
         if loaded is None and initial_T_wc is not None:
             raise SettingsError("initial_pose says where in a loaded map the camera is; load one")
-        return cls(sensor, settings, words, name, loaded, _pose_given(initial_T_wc))
+        return cls(
+            sensor,
+            settings,
+            words,
+            name,
+            loaded,
+            _pose_given(initial_T_wc),
+            _imu_of_camera(imu, settings),
+        )
+
+
+def _imu_of_file(settings: str | Path) -> Path | None:
+    """The settings file, if it also describes an IMU beside the camera."""
+    path = Path(settings)
+    return path if path.is_file() and describes_imu(path) else None
+
+
+def _imu_of_camera(imu: ImuSettings | str | Path | None, settings: Settings) -> ImuSettings | None:
+    """Take IMU settings, or a file of them, for the camera that is tracked."""
+    if imu is None:
+        return None
+    if not isinstance(imu, ImuSettings):
+        imu = read_imu_settings(path_of(imu, "imu", SettingsError))
+    rectification = settings.rectification
+    if settings.sensor is Sensor.STEREO and rectification is not None:
+        return imu.seen_by(rectification.left.R)
+    return imu
 
 
 def _pose_given(T_wc: npt.ArrayLike | None) -> core.Pose | None:

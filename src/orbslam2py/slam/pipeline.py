@@ -31,6 +31,7 @@ from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingL
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.front_end import FrontEnd
+from orbslam2py.slam.inertial import InertialInput
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
@@ -78,6 +79,8 @@ class Pipeline:
     ----------
     front_end, tracking, back_end
         The stages: images to frames, frames to poses, keyframes to a map.
+    inertial : InertialInput
+        The samples of the IMU that wait for their images.
     localization : LocalizationSwitch
         Whether the map stays as it is.
     recorder : FrameRecorder
@@ -102,6 +105,7 @@ class Pipeline:
         )
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         self.tracking = _make_tracking(setup, back_end, options, config)
+        self.inertial = InertialInput(setup.imu)
         self.localization = LocalizationSwitch(
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
@@ -196,6 +200,8 @@ class Pipeline:
             # From here on the image counts: every id is one image.
             self._next_frame_id += 1
             self._last_timestamp = timestamp
+            # The samples of the IMU from the image before to this one; None without an IMU.
+            interval = self.inertial.take(timestamp)
             outcome = tracking.track(
                 frame, timer, localize=self.localization.on, details=details or bool(watchers)
             )
@@ -205,6 +211,7 @@ class Pipeline:
             self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
+        self.inertial.look(interval, record)
         self._announce(state_before, record)
         self.back_end.mapping.start()
         for watch in watchers:
@@ -347,6 +354,7 @@ class Pipeline:
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
         self.tracking.reset()
         self.front_end.reset()
+        self.inertial.restart()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
 

@@ -26,6 +26,7 @@ from orbslam2py._arguments import (
 from orbslam2py._call_guard import CallGuard
 from orbslam2py._timing import StageTimer
 from orbslam2py.errors import MapFileError, StateError, WorkerError
+from orbslam2py.inertial.samples import ImuSamples
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_copies import take_contents
 from orbslam2py.maps.map_file import MapFile
@@ -37,6 +38,7 @@ from orbslam2py.maps.snapshot import (
     take_snapshot,
     take_snapshots,
 )
+from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import abandon
@@ -107,6 +109,10 @@ class System:
     config : Config or mapping, optional
         Changes of single thresholds, by names with a dot: ``{"tracking.map_matches": 12}``; see
         `orbslam2py.slam.config`.
+    imu : ImuSettings, str or path, optional
+        The IMU beside the (left, unrectified) camera, or a file that `read_imu_settings` reads; by
+        default what the settings file says of it (``IMU.*`` keys). Needed for `track` with samples
+        and for `add_imu`.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.
@@ -154,6 +160,7 @@ class System:
         new_map_after: float = 2.0,
         effort: Effort | str = Effort.NORMAL,
         config: Config | Mapping[str, Any] | None = None,
+        imu: ImuSettings | str | Path | None = None,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -169,7 +176,9 @@ class System:
             effort=effort,  # type: ignore[arg-type]
             config={} if config is None else config,  # type: ignore[arg-type]
         )
-        setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
+        setup = Setup.of(
+            settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup, imu
+        )
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
         for doubt in self.settings.doubts():
             _log.warning("%s", doubt)
@@ -189,6 +198,7 @@ class System:
         *,
         mask: PairMask | None = None,
         details: bool = False,
+        imu: ImuSamples | npt.ArrayLike | None = None,
     ) -> TrackingRecord:
         """Track the images of one moment.
 
@@ -207,6 +217,11 @@ class System:
             No keypoint lies where it is 0; one array serves both images of a pair.
         details : bool
             Also return the frame's keypoints and matches.
+        imu : array of float64 (n, 7), optional
+            Samples of an IMU since the image before, rows ``[t, gyro x, y, z, accelerometer x, y,
+            z]``: seconds on the clock of the IMU, rad/s, m/s^2. A sample after the image helps to
+            interpolate. Tracking does not use them yet; they are compared with the path of the
+            camera, and a warning says what is wrong with them. The call never waits for samples.
 
         Returns
         -------
@@ -221,10 +236,15 @@ class System:
             After shutdown, or while another call runs.
         ImageError
             For bad or missing images and for bad time stamps; the frame is not counted and nothing
-            has changed, but for a reset that had been asked for.
+            has changed, but for a reset that had been asked for. Samples of the IMU wait for the
+            next image then.
+        DatasetError
+            If the samples of the IMU have another shape; nothing has changed then.
         WorkerError
             If a worker has failed; the original exception is its cause.
         """
+        if imu is not None:
+            self.pipeline.inertial.add(imu)
         first, second, own_mask = arrays_of(images, self.sensor, timestamp)
         chosen = own_mask if mask is None else mask
 
@@ -235,6 +255,42 @@ class System:
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
             return self.pipeline.process(timestamp, build, first, details=details)
+
+    def add_imu(self, samples: ImuSamples | npt.ArrayLike) -> None:
+        """Add samples of an IMU as they come; they wait for the images that they belong to.
+
+        May be called from any thread, also while an image is tracked. Samples that are late,
+        repeated, not finite or out of order are left out or sorted; one warning says so.
+
+        Parameters
+        ----------
+        samples : array of float64 (n, 7), or (7,)
+            Rows as for `track`.
+
+        Raises
+        ------
+        DatasetError
+            If they have another shape; nothing has changed then.
+        """
+        self.pipeline.inertial.add(samples)
+
+    def wait_for_imu(self, timestamp: float, timeout: float = 0.1) -> bool:
+        """Wait until the samples of `add_imu` reach an image that is to be tracked next.
+
+        Parameters
+        ----------
+        timestamp : float
+            Of the image, seconds.
+        timeout : float
+            Seconds to wait at most; a warning says once that samples did not come.
+
+        Returns
+        -------
+        bool
+            Whether they came; True at once without IMU settings.
+        """
+        inertial = self.pipeline.inertial
+        return inertial.settings is None or inertial.buffer.wait_for(timestamp, timeout)
 
     def track_stereo(
         self,
@@ -304,7 +360,7 @@ class System:
         source : sequence, or iterable of frames
             As from `orbslam2py.open_sequence`, or whatever gives frames with a ``timestamp`` and
             ``images``: a camera, ``itertools.islice(sequence, 100)``. A mask that comes with the
-            images is used.
+            images is used, and the samples of ``imu`` if the system knows the IMU.
         details : bool
             Also return the frames' keypoints and matches.
 
@@ -321,8 +377,11 @@ class System:
         DatasetError
             If a file is missing.
         """
-        images_in_time = timed_images(source, self.sensor)
-        records = [self.track(images, t, details=details) for t, images in images_in_time]
+        with_imu = self.pipeline.inertial.settings is not None
+        records = [
+            self.track(one.images, one.timestamp, details=details, imu=one.imu)
+            for one in timed_images(source, self.sensor, with_imu=with_imu)
+        ]
         self.wait_until_idle()
         return records
 

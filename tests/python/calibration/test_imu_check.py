@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.calibration.imu_check import check_imu, draw_imu_check
-from orbslam2py.calibration.imu_check.streams import saturated
 from orbslam2py.datasets import ImuSamples, open_sequence
+from orbslam2py.inertial.check import check_imu, draw_imu_check
+from orbslam2py.inertial.check.streams import saturated
 from orbslam2py.settings import ImuSettings, imu_noise, read_imu_settings
 from orbslam2py.synthetic.imu import T_CI
 from orbslam2py.synthetic.spline import PoseSpline

@@ -102,7 +102,7 @@ def test_a_recording_without_an_imu(command, made, tmp_path):
     shutil.copytree(made, tmp_path / "bare", ignore=shutil.ignore_patterns("imu0"))
     done = command("check-imu", "bare")
     assert done.code == 2
-    assert "has no samples of an IMU; give a table with --imu FILE" in done.err
+    assert "has no samples of an IMU; give a table with --imu-samples FILE" in done.err
 
 
 @pytest.mark.shared

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.calibration.imu_check.rates import signed_permutations
+from orbslam2py.inertial.check.rates import signed_permutations
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import quaternions_from_rotations, rotations_from_quaternions
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.calibration.imu_check import streams
-from orbslam2py.calibration.imu_check.gravity import GravityFit, fit_gravity
-from orbslam2py.calibration.imu_check.rates import (
+from orbslam2py.inertial.check import streams
+from orbslam2py.inertial.check.gravity import GravityFit, fit_gravity
+from orbslam2py.inertial.check.rates import (
     MeanGyro,
     RateFit,
     axes_text,
@@ -18,8 +18,8 @@ from orbslam2py.calibration.imu_check.rates import (
     fit_rates,
     signed_permutations,
 )
-from orbslam2py.calibration.imu_check.report import ImuReport
-from orbslam2py.datasets import ImuSamples
+from orbslam2py.inertial.check.report import ImuReport
+from orbslam2py.inertial.samples import ImuSamples
 from orbslam2py.settings import ImuSettings
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles

@@ -10,8 +10,8 @@ import numpy as np
 from orbslam2py import _palette as palette
 from orbslam2py._figures import write_figure
 from orbslam2py._palette import hexadecimal
-from orbslam2py.calibration.imu_check.report import ImuReport
-from orbslam2py.datasets import ImuSamples
+from orbslam2py.inertial.check.report import ImuReport
+from orbslam2py.inertial.samples import ImuSamples
 
 _CAMERA = hexadecimal(palette.PAPER_PATH)
 _GYRO = hexadecimal(palette.PAPER_LOOP)

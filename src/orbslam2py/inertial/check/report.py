@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from orbslam2py.calibration.imu_check.gravity import GravityFit
-from orbslam2py.calibration.imu_check.rates import RateFit
+from orbslam2py.inertial.check.gravity import GravityFit
+from orbslam2py.inertial.check.rates import RateFit
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The IMU that a command is given: its settings and a table of its samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbslam2py.datasets import AccelUnit, GyroUnit, ImuSamples, read_imu_csv
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import ImuSettings, imu_noise, read_imu_settings
+from orbslam2py.settings.imu_files import describes_imu, has_imu_keys
+
+
+def imu_settings_given(
+    settings: str | None, files: list[str] | None, chip: str | None
+) -> ImuSettings | None:
+    """Read the IMU settings that the user gave; None if there are none.
+
+    Parameters
+    ----------
+    settings
+        Of the camera: a file may describe the IMU, too.
+    files
+        Of ``--imu-settings``.
+    chip
+        Name of the chip, for the noise that no file tells.
+
+    Raises
+    ------
+    SettingsError
+        If they are wrong or incomplete.
+    """
+    noise = None if chip is None else imu_noise(chip)
+    if files:
+        return read_imu_settings(*files, noise=noise)
+    if settings is None or not Path(settings).is_file() or not has_imu_keys(Path(settings)):
+        return None
+    if noise is None and not describes_imu(Path(settings)):
+        return None
+    return read_imu_settings(settings, noise=noise)
+
+
+def check_units(
+    table: Path | None, gyro_unit: GyroUnit | None, accel_unit: AccelUnit | None
+) -> None:
+    """See that units are given for a table only.
+
+    Raises
+    ------
+    SettingsError
+        If there is none.
+    """
+    if table is None and (gyro_unit or accel_unit):
+        raise SettingsError(
+            "--gyro-unit and --accel-unit are for the table of --imu-samples; give it, or leave "
+            "them out"
+        )
+
+
+def read_table(
+    table: Path | None, gyro_unit: GyroUnit | None, accel_unit: AccelUnit | None
+) -> ImuSamples | None:
+    """Read the table of ``--imu-samples``; None if none was given."""
+    if table is None:
+        return None
+    return read_imu_csv(table, gyro_unit=gyro_unit, accel_unit=accel_unit)

@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The IMU beside the camera: its samples by image, and whether it fits the camera."""
+
+from orbslam2py.slam.inertial.imu_buffer import ImuBuffer, ImuInterval
+from orbslam2py.slam.inertial.inertial_input import InertialInput
+
+__all__ = ["ImuBuffer", "ImuInterval", "InertialInput"]
