@@ -3,5 +3,6 @@
 
 from orbslam2py.slam.inertial.imu_buffer import ImuBuffer, ImuInterval
 from orbslam2py.slam.inertial.inertial_input import InertialInput
+from orbslam2py.slam.inertial.inertial_tracker import InertialTracker
 
-__all__ = ["ImuBuffer", "ImuInterval", "InertialInput"]
+__all__ = ["ImuBuffer", "ImuInterval", "InertialInput", "InertialTracker"]
