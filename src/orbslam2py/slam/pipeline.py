@@ -31,7 +31,7 @@ from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingL
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.inertial import InertialInput
+from orbslam2py.slam.inertial import InertialInput, InertialTracker
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
@@ -206,7 +206,11 @@ class Pipeline:
             # The samples of the IMU from the image before to this one; None without an IMU.
             interval = self.inertial.take(timestamp)
             outcome = tracking.track(
-                frame, timer, localize=self.localization.on, details=details or bool(watchers)
+                frame,
+                timer,
+                localize=self.localization.on,
+                details=details or bool(watchers),
+                interval=interval,
             )
         self.statistics.add(timer.milliseconds)
 
@@ -315,6 +319,7 @@ class Pipeline:
             milliseconds=timer.milliseconds,
             features=frame_features(frame, outcome.inliers) if details else None,
             evidence=estimate.evidence,
+            method=estimate.method if ok and not outcome.begins_map else None,
         )
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
@@ -389,7 +394,29 @@ def _at_once(work: Callable[[], None]) -> None:
 def _make_search(
     setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
 ) -> PoseSearch:
-    return PoseSearch(back_end.map, setup.vocabulary, setup.sensor, relocalizer, config.tracking)
+    return PoseSearch(
+        back_end.map,
+        setup.vocabulary,
+        setup.sensor,
+        relocalizer,
+        config.tracking,
+        pixels_per_radian=setup.settings.camera.pixels_per_radian,
+    )
+
+
+def _make_inertial(setup: Setup, back_end: BackEnd) -> InertialTracker | None:
+    """The tracker of an IMU; None without settings of one."""
+    if setup.imu is None:
+        return None
+    workers = back_end.map_workers
+    tracker = InertialTracker(
+        back_end.map,
+        setup.imu,
+        metric=setup.sensor.has_depth,
+        idle=lambda: all(worker.idle for worker in workers),
+    )
+    back_end.mapping.inertial = tracker.keyframes
+    return tracker
 
 
 def _make_tracking(
@@ -453,4 +480,5 @@ def _make_tracking(
         config=config,
         has_depth=sensor.has_depth,
         new_map_after=options.new_map_after if options.several_maps else None,
+        inertial=_make_inertial(setup, back_end),
     )

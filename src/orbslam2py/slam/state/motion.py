@@ -35,9 +35,9 @@ class Velocity:
 
     def over(self, seconds: float) -> core.Pose:
         """Return the motion over another interval; over more than a second, that over a second."""
-        seconds = math.copysign(min(abs(seconds), _LONGEST), seconds)
         if abs(seconds - self.seconds) <= _SAME_INTERVAL * abs(self.seconds):
             return self.step
+        seconds = math.copysign(min(abs(seconds), _LONGEST), seconds)
         return core.Pose.exp(seconds / self.seconds * self.step.log())
 
     def scaled(self, scale_change: float) -> Velocity:
@@ -60,6 +60,9 @@ class Motion:
     """Copies of the points that the last frame saw, as of the last `following`."""
     is_tracked: bool = False
     """The next frame follows the last one: the camera was not lost in between."""
+    prediction_covariance: FloatArray | None = None
+    """(6, 6), of the next pose, whose motion `velocity` holds as an IMU predicts it; None without
+    one."""
     map_motion: core.Pose | None = None
     """Motion of the map under the last frame since it was tracked, by local bundle adjustment."""
 
@@ -88,6 +91,31 @@ class Motion:
         T_cl = self.predicted(frame.timestamp)
         frame.T_cw = T_lw if T_cl is None else T_cl @ T_lw
         frame.share_anchor(self.last)
+
+    def prior(self) -> core.PosePrior | None:
+        """Return the predicted pose with its information, where an IMU predicts it."""
+        T_lw = None if self.last_frame is None else self.last_frame.T_cw
+        if self.prediction_covariance is None or self.velocity is None or T_lw is None:
+            return None
+        return core.PosePrior(self.velocity.step @ T_lw, np.linalg.inv(self.prediction_covariance))
+
+    def median_depth(self) -> float:
+        """Return the median depth of the points that the last frame saw; 1 without points."""
+        T_lw = None if self.last_frame is None else self.last_frame.T_cw
+        if T_lw is None or not len(self.last_points):
+            return 1.0
+        depths = (T_lw @ np.ascontiguousarray(self.last_points.positions))[:, 2]
+        return max(1e-6, float(np.median(depths)))
+
+    def deviation_in_image(self) -> float:
+        """Return the standard deviation [rad] of the directions of predicted points, by an IMU.
+
+        It is that of points at the median depth of those that the last frame saw; 0 without an IMU.
+        """
+        if self.prediction_covariance is None:
+            return 0.0
+        variances = np.diag(self.prediction_covariance)
+        return math.sqrt(variances[:3].max() + variances[3:].max() / self.median_depth() ** 2)
 
     def predict_turned(self, frame: core.TrackedFrame, quaternion_xyzw: FloatArray) -> None:
         """Set the pose of a frame by the translation of the velocity and a given rotation.
