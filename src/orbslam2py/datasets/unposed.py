@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Images, Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of, with_rectified_images
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
@@ -76,6 +76,7 @@ class UnposedSource:
         self.settings: Settings = resolve_settings(settings, self.sensor)
         if fps is not None:
             self.settings = replace(self.settings, camera=with_rate(self.settings.camera, fps))
+        self.settings = with_rectified_images(self.settings)
         self._what = what
         self._size_checked = False
 
