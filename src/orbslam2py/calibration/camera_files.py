@@ -9,9 +9,8 @@ from enum import Enum
 from pathlib import Path
 
 from orbslam2py._arguments import cannot_open, is_whole, member_of, path_of, shown
-from orbslam2py.calibration.camera_model import camera_settings
 from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile, ForeignCamera
-from orbslam2py.calibration.foreign_pairs import Pair, pair_settings
+from orbslam2py.calibration.foreign_pairs import Pair, pair_settings, raw_camera
 from orbslam2py.calibration.formats import READERS
 from orbslam2py.calibration.lenses import require_supported
 from orbslam2py.calibration.unknown_files import refuse_unknown

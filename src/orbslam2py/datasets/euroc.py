@@ -147,7 +147,7 @@ class EurocSequence(RecordedSequence):
         return self._left[index], self._right[index]
 
     def ground_truth(self) -> Trajectory | None:
-        """Read the body's poses and move them to the left camera, the rectified one if there is one.
+        """Read the body's poses and move them to the left camera, rectified if it is.
 
         See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing
         or has no ``T_BS``: the camera's place on the vehicle is unknown then.

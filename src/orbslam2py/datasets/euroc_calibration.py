@@ -168,9 +168,7 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
     cameras = monocular_settings(left).camera, monocular_settings(right).camera
     pair = cameras_of_pair(*cameras, T_right_left, left.size, "T_BS of both cameras")
     published = builtin_settings("euroc", Sensor.STEREO)
-    return Settings(
-        sensor=Sensor.STEREO, **pair.fields, orb=published.orb, depth=published.depth
-    )
+    return Settings(sensor=Sensor.STEREO, **pair.fields, orb=published.orb, depth=published.depth)
 
 
 def _rigid(path: Path, entry: Entry) -> FloatArray:

@@ -92,7 +92,7 @@ class RecordedSequence(FramesInOrder, ABC):
 
     @cached_property
     def settings(self) -> Settings:
-        """The settings the caller chose, or `default_settings`; raw pairs come rectified by them."""
+        """The settings the caller chose, or `default_settings`; pairs come rectified by them."""
         chosen = self.default_settings() if self._chosen is None else self._chosen
         return with_rectified_images(chosen)
 

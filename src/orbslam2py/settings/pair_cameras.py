@@ -215,7 +215,7 @@ def _common_rectangle(
         for border in borders:
             rays = model.unproject(border) @ R.T
             # Corners may be dark, and then the rest of the border counts.
-            planes.append((rays[:, :2] / np.where(rays[:, 2:] > 0, rays[:, 2:], np.nan)))
+            planes.append(rays[:, :2] / np.where(rays[:, 2:] > 0, rays[:, 2:], np.nan))
         ends.append(
             (
                 np.nanmax(planes[0][:, 0]),

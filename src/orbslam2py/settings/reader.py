@@ -41,7 +41,7 @@ from orbslam2py.settings.opencv_yaml import (
     read_number,
     scan,
 )
-from orbslam2py.settings.right_camera import RightCamera, SettingsGroups
+from orbslam2py.settings.right_camera import SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.translation import Translated, is_translated, translate
 from orbslam2py.settings.unknown_keys import problem_of_unknown_key, unused_keys

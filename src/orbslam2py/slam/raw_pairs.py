@@ -16,12 +16,13 @@ from orbslam2py.settings.settings import Settings
 
 _log = logging.getLogger(__name__)
 
-#: A pair comes rectified if so many times as many keypoints have a match as it is, and so many more.
+#: A pair comes rectified if this factor more keypoints, and at least this number more, have a match
+#: before rectification.
 _MORE, _LEAST_MORE = 1.5, 50
 _TEXT = (
     "the pairs come rectified already: as they are {n_given} keypoints have a match, after "
-    "rectification by the settings {n_rectified}; they are tracked as they are. Give the raw images "
-    "of both cameras, or settings without the calibration of the raw ones (LEFT.*, RIGHT.*, "
+    "rectification by the settings {n_rectified}; they are tracked as they are. Give the raw "
+    "images of both cameras, or settings without the calibration of the raw ones (LEFT.*, RIGHT.*, "
     "Camera2.*)"
 )
 
@@ -67,9 +68,7 @@ class RawPairs:
         """
         if self.warning is not None:
             return left, right
-        rectified = self._rectifier.rectify(
-            np.ascontiguousarray(left), np.ascontiguousarray(right)
-        )
+        rectified = self._rectifier.rectify(np.ascontiguousarray(left), np.ascontiguousarray(right))
         if self._undecided and self._are_rectified((left, right), rectified):
             return left, right
         return rectified
@@ -89,7 +88,7 @@ class RawPairs:
     def _are_rectified(
         self, given: tuple[ByteArray, ByteArray], rectified: tuple[ByteArray, ByteArray]
     ) -> bool:
-        """Compare how many points match along rows, before and after, in the first pair with some."""
+        """Count matches along rows before and after rectification, in the first pair with some."""
         n_given, n_rectified = self._count_matches(*given), self._count_matches(*rectified)
         if max(n_given, n_rectified) < _LEAST_MORE:
             return False  # a dark image does not count

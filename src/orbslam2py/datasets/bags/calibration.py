@@ -131,8 +131,9 @@ class CameraInfo:
         if self.is_fisheye:
             raise DatasetError(
                 f"{self.what}: the distortion model {self.model} is not supported for "
-                "depth of another camera, nor for a pair without a transform; use one camera (--sensor mono), record rectified "
-                f"images (image_proc), or {_ADVICE} of undistorted ones"
+                "depth of another camera, nor for a pair without a transform; use one camera "
+                "(--sensor mono), record rectified images (image_proc), or "
+                f"{_ADVICE} of undistorted ones"
             )
         if self.model not in _MODELS:
             raise DatasetError(
