@@ -327,9 +327,9 @@ def _with_baseline(path: Path, settings: Settings, baseline: float | None) -> Se
     if likely:
         raise SettingsError(f"{path} tells the baseline, {found:.4g} m; leave --baseline out")
     if settings.right is not None:
-        T = settings.right.T_right_left.copy()
+        T = settings.right.T_left_right.copy()
         T[:3, 3] *= baseline / found
-        return replace(settings, right=replace(settings.right, T_right_left=T))
+        return replace(settings, right=replace(settings.right, T_left_right=T))
     bf = settings_for_camera(settings.camera, Sensor.STEREO, baseline=baseline).camera.bf
     pair = settings.rectification
     if pair is not None:

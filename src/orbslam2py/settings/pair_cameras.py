@@ -24,7 +24,7 @@ from orbslam2py.settings.groups import (
     StereoRectification,
 )
 from orbslam2py.settings.rectify import rectification_of_pair
-from orbslam2py.settings.right_camera import RightCamera, checked_extrinsics
+from orbslam2py.settings.right_camera import RightCamera, checked_extrinsics, inverse_of
 
 #: Most stretching of a fisheye image, at the middle of its borders and along the radius.
 MOST_STRETCH = 3.0
@@ -99,7 +99,7 @@ def cameras_of_pair(
     rotations = _rectifying_rotations(T)
     _require_side_by_side(np.asarray(rotations[1] @ T[:3, 3]), name)
     if max(map(_stretch, models, rotations)) > MOST_STRETCH:
-        second = RightCamera(replace(right, width=size[0], height=size[1]), T)
+        second = RightCamera(replace(right, width=size[0], height=size[1]), inverse_of(T))
         bf = second.baseline * whole.pixels_per_radian
         return PairCameras(replace(whole, bf=bf), right=second)
     return _rectified(whole, _rectification_of_models(models, rotations, T, size))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -108,7 +108,8 @@ def rectified_pair(
         problems.append(Problem(pose_entry.line, text))
         return None
     if found.right is not None:
-        return RawPair(None, {"bf": found.camera.bf}, found.right)
+        right = replace(found.right, T_left_right=pose)  # with all its digits
+        return RawPair(None, {"bf": found.camera.bf}, right)
     assert found.rectification is not None
     P_right = found.rectification.right.P
     bf = -float(P_right[0, 3])

@@ -66,6 +66,13 @@ def checked_extrinsics(T: object, name: str) -> FloatArray:
     return pose
 
 
+def inverse_of(T: FloatArray) -> FloatArray:
+    """Return the inverse of a rigid transform (4, 4)."""
+    inverse = np.eye(4)
+    inverse[:3, :3], inverse[:3, 3] = T[:3, :3].T, -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
 @dataclass(frozen=True, eq=False)
 class RightCamera(EqualByValue, MadeAgainByCopies):
     """The right camera of a pair that is matched without rectification: a fisheye pair.
@@ -74,8 +81,9 @@ class RightCamera(EqualByValue, MadeAgainByCopies):
     ----------
     camera
         Its lens and intrinsics; images must have the size of the left ones.
-    T_right_left
-        From left to right camera coordinates, (4, 4), metres.
+    T_left_right
+        From right to left camera coordinates, (4, 4), metres: its translation is where the right
+        camera stands. Kalibr and others give the inverse, `T_right_left`.
 
     Raises
     ------
@@ -84,24 +92,28 @@ class RightCamera(EqualByValue, MadeAgainByCopies):
     """
 
     camera: CameraSettings
-    T_right_left: FloatArray
+    T_left_right: FloatArray
 
     def __post_init__(self) -> None:
         if not isinstance(self.camera, CameraSettings):
             raise SettingsError(f"the right camera is {shown(self.camera)}; give CameraSettings")
-        pose = checked_extrinsics(self.T_right_left, "T_right_left")
-        object.__setattr__(self, "T_right_left", pose)
+        pose = checked_extrinsics(self.T_left_right, "T_left_right")
+        object.__setattr__(self, "T_left_right", pose)
+
+    @property
+    def T_right_left(self) -> FloatArray:
+        """From left to right camera coordinates, (4, 4), metres."""
+        return inverse_of(self.T_left_right)
 
     @property
     def centre(self) -> FloatArray:
         """Where the right camera stands, in left camera coordinates, (3,), metres."""
-        T = self.T_right_left
-        return np.asarray(-T[:3, :3].T @ T[:3, 3])
+        return self.T_left_right[:3, 3]
 
     @property
     def baseline(self) -> float:
         """Distance of the two cameras, metres."""
-        return float(np.linalg.norm(self.T_right_left[:3, 3]))
+        return float(np.linalg.norm(self.centre))
 
 
 class SettingsGroups(TypedDict):

@@ -77,9 +77,7 @@ def _right_lines(right: RightCamera | None) -> list[str]:
         names = zip(DISTORTION_FIELDS, camera.distortion.tolist(), strict=False)
         lines += ["Camera2.type: PinHole", *(f"Camera2.{n}: {value!r}" for n, value in names)]
     lines += [f"Camera2.{n}: {getattr(camera, n)!r}" for n in ("fx", "fy", "cx", "cy")]
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = right.T_right_left[:3, :3].T, right.centre
-    return lines + _matrix("Stereo.T_c1_c2", T)
+    return lines + _matrix("Stereo.T_c1_c2", right.T_left_right)
 
 
 def _number(key: Key, value: float) -> str:

@@ -59,7 +59,7 @@ class FrontEnd:
         # By the factor on the number of features; more while a single camera starts.
         self._extractors = {1: self._extractor}
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
-        self._raw_pairs = raw_pairs_of(settings, self._count_matches)
+        self._raw_pairs = raw_pairs_of(settings, self._extract_pair)
         self._wide_pair: core.WidePair | None = None
         self._check_calibration = check_calibration
         self._told_depth_size = False
@@ -156,12 +156,11 @@ class FrontEnd:
                 )
             return self._finished(frame, left, left_grey, rectifier)
 
-    def _count_matches(self, left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8]) -> int:
+    def _extract_pair(
+        self, left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8]
+    ) -> tuple[core.Extraction, core.Extraction]:
         assert self._pair_extractor is not None
-        camera = self._settings.camera
-        features = self._pair_extractor.extract(left, right)
-        _, depth = core.match_stereo(*features, self._extractor.scales, camera.bf, camera.fx)
-        return int(np.count_nonzero(depth > 0))
+        return self._pair_extractor.extract(left, right)
 
     def rgbd(
         self,

@@ -46,7 +46,7 @@ def lens_pair_of(settings: Settings) -> LensPair:
         models = pair.left.camera_model(), pair.right.camera_model()
     elif right is not None and camera.width is not None and camera.height is not None:
         size = camera.width, camera.height
-        to_right[:3, :3], to_right[:3, 3] = right.T_right_left[:3, :3].T, right.centre
+        to_right = right.T_left_right.copy()
         models = camera.camera_model(*size), right.camera.camera_model(*size)
     else:
         raise SettingsError(
