@@ -2,8 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <utility>
+#include <vector>
 
 #include "base/worker_thread.hpp"
 #include "camera/camera_model.hpp"
@@ -12,7 +14,7 @@
 namespace orbslam {
 
 /// Makes the images of one raw camera those of a pinhole that is turned against it: one camera of a
-/// pair whose rows shall correspond. Maps are in 1/32 pixel. See docs/method/frame.md#rectification.
+/// pair whose rows shall correspond. Maps are in 1/32 pixel, results are those of cv::remap. See docs/method/frame.md#rectification.
 class Rectifier {
  public:
   /// `R` turns raw into rectified camera coordinates, `plane` is the rectified camera, `size` that
@@ -34,11 +36,22 @@ class Rectifier {
   Eigen::Vector2d from_raw(const Eigen::Vector2d& raw) const;
 
  private:
+  /// For each rectified pixel where its four neighbours begin in a raw image without gaps, and how
+  /// far it lies from the first one in 1/32 pixel. Of pixels in `beside_` they are 0.
+  struct GreyMap {
+    std::vector<std::int32_t> offsets;
+    std::vector<std::uint16_t> right, down;
+  };
+
+  cv::Mat rectify_grey(const cv::Mat& image) const;
+
   CameraModel raw_;
   Eigen::Matrix3d R_;
   Pinhole plane_;
   ImageSize size_;
-  cv::Mat whole_, fraction_;
+  cv::Mat whole_, fraction_;  ///< OpenCV's maps
+  GreyMap grey_;
+  std::vector<std::int32_t> beside_;  ///< rectified pixels with a neighbour beside the raw image
 };
 
 /// Rectifies both images of a pair at the same time: the right one in the helper thread. One thread
