@@ -362,10 +362,11 @@ class CameraOptions:
     """
     What a Camera is made from.
     """
-    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, model: CameraModel = None) -> None:
+    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0, model: CameraModel = None, right_centre: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"] = ...) -> None:
         """
-        `model`: a CameraModel in place of fx, fy, cx, cy and distortion. Nothing is checked
-        before a Camera is made.
+        `model`: a CameraModel in place of fx, fy, cx, cy and distortion. `right_centre`: of
+        the right camera of a fisheye pair, in this camera's frame [m], in place of bf. Nothing
+        is checked before a Camera is made.
         """
     @property
     def bf(self) -> float:
@@ -497,6 +498,11 @@ class Camera:
     @property
     def has_baseline(self) -> bool:
         ...
+    @property
+    def has_wide_pair(self) -> bool:
+        """
+        The camera is the left one of a fisheye pair.
+        """
     @property
     def image_size(self) -> tuple[int, int]:
         """
@@ -820,6 +826,53 @@ class FrameContext:
     @property
     def scales(self) -> ScalePyramid:
         ...
+class PairRectifier:
+    """
+    Rectifies both images of a pair at the same time, in two threads.
+    """
+    def __init__(self, left: Rectifier, right: Rectifier) -> None:
+        ...
+    def rectify(self, left: numpy.typing.NDArray[numpy.uint8], right: numpy.typing.NDArray[numpy.uint8]) -> tuple[numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Rectified images (left, right) of raw ones; see Rectifier.rectify. Raises StateError
+        while another thread uses this object.
+        """
+class Rectifier:
+    """
+    Makes images of a raw camera those of a pinhole that is turned.
+    """
+    def __init__(self, raw: CameraModel, R: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        R (3, 3) turns raw into rectified camera coordinates; the others are of the rectified
+        camera [px]. Raises SettingsError when they are out of range.
+        """
+    def from_raw(self, pixels: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Rectified pixels (n, 2) of raw ones; NaN beside the plane.
+        """
+    def rectify(self, image: numpy.typing.NDArray[numpy.uint8], is_mask: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        The rectified image of a raw one (h, w) or (h, w, channels) uint8: bilinear, or the
+        nearest pixel for a mask; 0 where there is nothing. Raises ImageError for an image of
+        another size.
+        """
+    def to_raw(self, pixels: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Raw pixels (n, 2) of rectified ones; NaN where nothing is seen.
+        """
+class WidePair:
+    """
+    A fisheye pair, which is matched along its epipolar curves.
+    """
+    def __init__(self, left: Camera, right: CameraModel, R_right_left: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], t_right_left: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        """
+        `left` was made with right_centre; R (3, 3) and t (3,) [m] take left camera coordinates
+        into right ones. Raises SettingsError when the centres differ.
+        """
+    def match(self, left: Extraction, right: Extraction, scales: ScalePyramid) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
+        """
+        (right_u [px], depth [m] along the ray) of the left keypoints, float32, -1: none.
+        """
 class PairExtractor:
     """
     Extracts left and right images at the same time, in two threads.
@@ -3289,6 +3342,10 @@ def build_stereo_frame(context: FrameContext, id: typing.SupportsInt | typing.Su
     """
     Frame of a rectified pair with depth by stereo matching.
     """
+def build_wide_stereo_frame(context: FrameContext, pair: WidePair, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, left: Extraction, right: Extraction) -> Frame:
+    """
+    Frame of a fisheye pair with depth along the rays; the camera of the context is the left one of the pair.
+    """
 def camera_models() -> list[tuple[str, list[str], list[str]]]:
     """
     Name, other programs' names and parameter names of each camera model.
@@ -3673,9 +3730,9 @@ def room_T_wc(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3,
     """
     Camera to world (4, 4) of somebody looking around in a room, once in `period` seconds.
     """
-def sample_colours(frame: Frame, image: numpy.ndarray, is_rgb: bool) -> None:
+def sample_colours(frame: Frame, image: numpy.ndarray, is_rgb: bool, rectifier: PairRectifier = None) -> None:
     """
-    Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; a grey image gives none. Raises ImageError for an image of another size.
+    Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; a grey image gives none. With the rectifier of a raw pair the image is the raw left one. Raises ImageError for an image of another size.
     """
 def seed_of(seed: typing.SupportsInt | typing.SupportsIndex, first: typing.SupportsInt | typing.SupportsIndex, second: typing.SupportsInt | typing.SupportsIndex) -> int:
     """

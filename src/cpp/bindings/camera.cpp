@@ -129,16 +129,20 @@ void bind_camera_options(py::module_& module) {
   options
       .def(py::init([](double fx, double fy, double cx, double cy, int width, int height,
                        const std::vector<double>& distortion, double bf, double depth_ratio,
-                       const std::shared_ptr<CameraModel>& model) {
+                       const std::shared_ptr<CameraModel>& model,
+                       const Eigen::Vector3d& right_centre) {
              const Distortion lens = distortion_of(distortion);
-             return CameraOptions{{fx, fy, cx, cy}, lens, bf, depth_ratio, {width, height}, model};
+             return CameraOptions{{fx, fy, cx, cy}, lens,  bf,          depth_ratio,
+                                  {width, height},  model, right_centre};
            }),
            py::arg("fx") = 0.0, py::arg("fy") = 0.0, py::arg("cx") = 0.0, py::arg("cy") = 0.0,
            py::arg("width") = 0, py::arg("height") = 0,
            py::arg("distortion") = std::vector<double>{}, py::arg("bf") = 0.0,
            py::arg("depth_ratio") = 0.0, py::arg("model") = nullptr,
-           "`model`: a CameraModel in place of fx, fy, cx, cy and distortion. Nothing is checked\n"
-           "before a Camera is made.")
+           py::arg("right_centre") = Eigen::Vector3d(Eigen::Vector3d::Zero()),
+           "`model`: a CameraModel in place of fx, fy, cx, cy and distortion. `right_centre`: of\n"
+           "the right camera of a fisheye pair, in this camera's frame [m], in place of bf. Nothing\n"
+           "is checked before a Camera is made.")
       .def_property(
           "distortion", [](const CameraOptions& o) { return o.distortion; },
           [](CameraOptions& o, const std::vector<double>& d) { o.distortion = distortion_of(d); },
@@ -184,6 +188,8 @@ void bind_camera(py::module_& module) {
           "is_rectified", [](const Camera& camera) { return !camera.distorts(); },
           "True when the lens does not distort.")
       .def_property_readonly("has_baseline", &Camera::has_baseline)
+      .def_property_readonly("has_wide_pair", &Camera::has_wide_pair,
+                             "The camera is the left one of a fisheye pair.")
       .def_property_readonly("bf", &Camera::bf, "Baseline times fx [px m].")
       .def_property_readonly("baseline", &Camera::baseline, "Metres.")
       .def_property_readonly("close_depth", &Camera::close_depth,

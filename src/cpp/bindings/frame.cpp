@@ -334,6 +334,11 @@ void bind_builders(py::module_& module) {
              py::arg("timestamp"), py::arg("left"), py::arg("right"),
              py::call_guard<py::gil_scoped_release>(),
              "Frame of a rectified pair with depth by stereo matching.");
+  module.def("build_wide_stereo_frame", &build_wide_stereo_frame, py::arg("context"),
+             py::arg("pair"), py::arg("id"), py::arg("timestamp"), py::arg("left"),
+             py::arg("right"), py::call_guard<py::gil_scoped_release>(),
+             "Frame of a fisheye pair with depth along the rays; the camera of the context is the "
+             "left one of the pair.");
   module.def(
       "build_rgbd_frame",
       [](const FrameContext& context, FrameId id, double timestamp, const Extraction& extraction,
@@ -397,16 +402,17 @@ void bind_frame(py::module_& module) {
              "image; a contiguous grey image comes back itself.");
   module.def(
       "sample_colours",
-      [](Frame& frame, const py::array& image, bool is_rgb) {
+      [](Frame& frame, const py::array& image, bool is_rgb, const PairRectifier* rectifier) {
         if (!holds<std::uint8_t>(image)) throw ImageError("image must be uint8");
         const py::array pixels = normal_form(image);
         const cv::Mat source = view_image(pixels, CV_8U);
         const py::gil_scoped_release release;
-        sample_colours(source, is_rgb, frame);
+        sample_colours(source, is_rgb, frame, rectifier ? &rectifier->left() : nullptr);
       },
-      py::arg("frame"), py::arg("image"), py::arg("is_rgb"),
+      py::arg("frame"), py::arg("image"), py::arg("is_rgb"), py::arg("rectifier") = nullptr,
       "Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; "
-      "a grey image gives none. Raises ImageError for an image of another size.");
+      "a grey image gives none. With the rectifier of a raw pair the image is the raw left one. "
+      "Raises ImageError for an image of another size.");
   module.def(
       "keep_small_image",
       [](Frame& frame, const py::array& grey) {

@@ -35,8 +35,9 @@ py::array_t<bool> flags(std::vector<std::uint8_t>&& values) {
 }
 
 // Of a camera that CameraOptions::model describes: the number of its model (the place in
-// camera_model_rows(), from 1 on) and all its parameters; 0 and zeros of a pinhole.
-constexpr std::size_t kStoredLensSize = 16;
+// camera_model_rows(), from 1 on) and all its parameters; 0 and zeros of a pinhole. Of a fisheye
+// pair the last three are CameraOptions::right_centre; no model of such a pair has that many.
+constexpr std::size_t kStoredLensSize = 16, kStoredCentre = 13;
 using StoredLens = std::array<double, kStoredLensSize>;
 
 std::int64_t model_number_of(const CameraOptions& camera) {
@@ -48,6 +49,8 @@ StoredLens stored_lens_of(const CameraOptions& camera) {
   if (camera.model)
     std::copy_n(camera.model->parameters().begin(), camera.model->parameters().size(),
                 lens.begin());
+  if (!camera.right_centre.isZero())
+    std::copy_n(camera.right_centre.data(), 3, lens.begin() + kStoredCentre);
   return lens;
 }
 
@@ -279,6 +282,9 @@ void read_cameras(Arrays& arrays, StoredMap& stored) {
     camera.depth_ratio = ratio[i];
     camera.image_size = {small(width[i]), small(height[i])};
     camera.model = model_of(model[i], lens[i], camera.image_size);
+    if (camera.model && camera.model->parameters().size() <= kStoredCentre) {
+      std::copy_n(lens[i].begin() + kStoredCentre, 3, camera.right_centre.data());
+    }
     stored.cameras.push_back({camera, factor[i], small(levels[i])});
   }
 }

@@ -12,6 +12,7 @@ PYBIND11_MODULE(_core, module) {
   bind_camera_model(module);
   bind_camera(module);
   bind_inertial(module);
+  bind_raw_pairs(module);
   bind_frame(module);
   bind_frame_evidence(module);
   bind_map(module);

@@ -13,6 +13,9 @@
 namespace orbslam {
 namespace {
 
+/// Cosine to the optical axis from which on depth along the axis gives depth along the ray.
+constexpr double kLeastAxial = 0.05;
+
 bool positive(double value) { return std::isfinite(value) && value > 0; }
 
 void check(const CameraOptions& options) {
@@ -35,6 +38,9 @@ void check(const CameraOptions& options) {
       throw SettingsError("distortion coefficients k1, k2, p1, p2, k3 to k6 must be finite, got " +
                           std::to_string(coefficient));
     }
+  }
+  if (!options.right_centre.allFinite() || (!options.right_centre.isZero() && !options.model)) {
+    throw SettingsError("a fisheye pair needs the model of its left camera and a finite baseline");
   }
   if (!std::isfinite(options.bf) || options.bf < 0) {
     throw SettingsError("Camera.bf (baseline times fx) must not be negative, got " +
@@ -101,8 +107,24 @@ CameraOptions checked(const CameraOptions& options) {
     full.pinhole = pinhole_of(*options.model);
     full.distortion = {};
   }
+  if (!options.right_centre.isZero()) full.bf = options.right_centre.norm() * full.pinhole.fx;
   check(full);
   return full;
+}
+
+/// The sight of a keypoint of a fisheye pair: its pixel rows are turned to the epipolar direction,
+/// and all of it is scaled so that bf over the third row is the disparity. Along the baseline,
+/// where a pair sees no depth, it stays as it is.
+Sight turned_to_pair(const Sight& B, const CameraOptions& options) {
+  const Eigen::Vector2d shift = B.topRows<2>() * options.right_centre;
+  const double per_inverse_depth = shift.norm();
+  if (!(per_inverse_depth > Camera::kLeastShift * options.bf)) return B;
+  const Eigen::Vector2d along = shift / per_inverse_depth;
+  Eigen::Matrix2d turn;
+  turn << along.x(), along.y(), -along.y(), along.x();
+  Sight turned = B;
+  turned.topRows<2>() = turn * Eigen::Matrix<double, 2, 3>(B.topRows<2>());
+  return turned * (options.bf / per_inverse_depth);
 }
 
 LensModel lens_of(const CameraOptions& options) {
@@ -120,8 +142,10 @@ LensModel lens_of(const CameraOptions& options) {
 Camera::Camera(const CameraOptions& options)
     : options_(checked(options)),
       lens_(lens_of(options_)),
-      flat_(orbslam::is_flat(lens_)),
-      distorts_(std::holds_alternative<lens_models::PlaneDistortionLens>(lens_)),
+      // Any camera of a fisheye pair keeps its image as it is.
+      flat_(orbslam::is_flat(lens_) && options_.right_centre.isZero()),
+      distorts_(flat_ && std::holds_alternative<lens_models::PlaneDistortionLens>(lens_)),
+      wide_pair_(!options_.right_centre.isZero()),
       bounds_(bounds_of(*this)) {
   if (has_baseline()) close_depth_ = options_.bf * options_.depth_ratio / options_.pinhole.fx;
 }
@@ -175,7 +199,32 @@ Sight Camera::sight(double u, double v) const {
   if (!shown) return Sight::Constant(std::numeric_limits<double>::quiet_NaN());
   B.topRows<2>() = seen.J;
   B.row(2) = ray.transpose();
-  return B;
+  return wide_pair_ ? turned_to_pair(B, options_) : B;
+}
+
+double Camera::along_curve_of_pair(const Eigen::Vector2d& error, double u, double v) const {
+  Seen seen;
+  if (!project(wide_ray(u, v), seen)) return error.x();
+  const Eigen::Vector2d shift = seen.J * options_.right_centre;
+  return shift.norm() > kLeastShift * options_.bf ? error.dot(shift.normalized()) : error.x();
+}
+
+double Camera::disparity(const Eigen::Vector3d& p_c) const {
+  if (flat_) return options_.bf / p_c.z();
+  if (!wide_pair_) return options_.bf / p_c.norm();
+  Seen seen;
+  if (!project(p_c, seen)) return std::numeric_limits<double>::quiet_NaN();
+  return (seen.J * options_.right_centre).norm();
+}
+
+double Camera::disparity(double u, double v, double depth) const {
+  return flat_ ? options_.bf / depth : options_.bf / sight(u, v).row(2).norm() / depth;
+}
+
+double Camera::depth_of_axial(double u, double v, double z) const {
+  if (flat_) return z;
+  const double along_axis = wide_ray(u, v).z();
+  return along_axis > kLeastAxial ? z / along_axis : 0;
 }
 
 bool Camera::project(const Eigen::Vector3d& p_c, Seen& seen) const {

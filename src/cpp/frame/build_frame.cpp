@@ -96,6 +96,16 @@ std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId i
   return frame;
 }
 
+std::shared_ptr<Frame> build_wide_stereo_frame(const FrameContext& context, const WidePair& pair,
+                                               FrameId id, double timestamp, Extraction left,
+                                               const Extraction& right) {
+  StereoMatches matches = pair.match(left, right, *context.scales);
+  auto frame = frame_of(context, id, timestamp, std::move(left.features));
+  frame->right_u = std::move(matches.right_u);
+  frame->depth = std::move(matches.depth);
+  return frame;
+}
+
 std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id, double timestamp,
                                         Features features, const cv::Mat& depth, double factor) {
   const Camera& camera = *context.camera;
@@ -117,8 +127,11 @@ std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id,
     const float z = metres.at<float>(static_cast<int>(i));
     // Some drivers write infinity for "too far", which is as good as no measurement.
     if (!(z > 0.0F) || !std::isfinite(z)) continue;
-    frame->depth[i] = z;
-    frame->right_u[i] = frame->keypoints[i].x - bf / z;
+    const Keypoint& keypoint = frame->keypoints[i];
+    const auto metric = static_cast<float>(camera.depth_of_axial(keypoint.x, keypoint.y, z));
+    if (!(metric > 0.0F)) continue;
+    frame->depth[i] = metric;
+    frame->right_u[i] = keypoint.x - bf / metric;
   }
   return frame;
 }

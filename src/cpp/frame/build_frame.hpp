@@ -6,6 +6,7 @@
 
 #include "features/orb_extractor.hpp"
 #include "frame/frame.hpp"
+#include "frame/wide_pair.hpp"
 
 namespace orbslam {
 
@@ -25,6 +26,13 @@ std::shared_ptr<Frame> build_monocular_frame(const FrameContext& context, FrameI
 /// docs/method/frame.md#stereo-matching.
 std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId id, double timestamp,
                                           Extraction left, const Extraction& right);
+
+/// Frame of a fisheye pair, whose images are as the cameras take them; depth along the rays. The
+/// camera of the context is the left one of the pair. Throws ImageError as WidePair::match() does.
+/// See docs/method/frame.md#fisheye-pairs.
+std::shared_ptr<Frame> build_wide_stereo_frame(const FrameContext& context, const WidePair& pair,
+                                               FrameId id, double timestamp, Extraction left,
+                                               const Extraction& right);
 
 /// Frame of a colour image with registered depth (one channel; divided by `factor` as in
 /// to_depth_metres() it is metres; <= 0, infinite or NaN: no depth), which is read at the pixel of

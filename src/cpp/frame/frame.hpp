@@ -29,7 +29,8 @@ struct Frame {
   std::vector<Keypoint> raw_keypoints;  ///< as extracted; empty when the lens does not distort
   std::vector<Descriptor> descriptors;
   std::vector<float> right_u;  ///< column in the right image; meaningful where depth > 0, else -1
-  std::vector<float> depth;    ///< metres, -1 when unknown
+  /// Metres, -1 when unknown; along the optical axis of a flat plane, along a fisheye lens's ray.
+  std::vector<float> depth;
   /// Red, green, blue of the image at each keypoint; empty when the image was grey.
   std::vector<std::array<std::uint8_t, 3>> colours;
   KeypointGrid grid;

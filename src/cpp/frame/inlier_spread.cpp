@@ -47,9 +47,9 @@ struct Residuals {
     Eigen::Vector3d r(-error.x(), -error.y(), 0);
     const bool has_depth = frame.has_depth(i);
     if (has_depth) {
-      by_point.row(2) = by_point.row(0);
-      by_point(2, 2) += frame.camera->bf() / (p.z() * p.z());
-      r.z() = -frame.camera->right_error(p, error, keypoint.x, frame.right_u[i]);
+      const double bf = frame.camera->bf();
+      by_point.row(2) = by_point.row(0) + bf / (q.z() * q.z()) * sight.row(2);
+      r.z() = -(error.x() + (keypoint.x - frame.right_u[i]) - bf / q.z());
     }
     if (!r.allFinite()) return;
     const double weight = frame.scales->inverse_sigma2(keypoint.level);

@@ -7,9 +7,9 @@
 
 namespace orbslam {
 
-void sample_colours(const cv::Mat& image, bool is_rgb, Frame& frame) {
+void sample_colours(const cv::Mat& image, bool is_rgb, Frame& frame, const Rectifier* rectifier) {
   frame.colours.clear();
-  const ImageSize size = frame.camera->image_size();
+  const ImageSize size = rectifier ? rectifier->raw().image_size() : frame.camera->image_size();
   const int channels = image.channels();
   if (image.depth() != CV_8U || image.cols != size.width || image.rows != size.height ||
       (channels != 1 && channels != 3 && channels != 4)) {
@@ -22,8 +22,13 @@ void sample_colours(const cv::Mat& image, bool is_rgb, Frame& frame) {
   const int red = is_rgb ? 0 : 2, blue = 2 - red;
   frame.colours.resize(raw.size());
   for (std::size_t i = 0; i < raw.size(); ++i) {
-    const int column = std::clamp(static_cast<int>(raw[i].x + 0.5F), 0, image.cols - 1);
-    const int row = std::clamp(static_cast<int>(raw[i].y + 0.5F), 0, image.rows - 1);
+    Eigen::Vector2f at(raw[i].x, raw[i].y);
+    if (rectifier) {
+      const Eigen::Vector2f found = rectifier->to_raw(at.cast<double>()).cast<float>();
+      if (found.allFinite()) at = found;
+    }
+    const int column = std::clamp(static_cast<int>(at.x() + 0.5F), 0, image.cols - 1);
+    const int row = std::clamp(static_cast<int>(at.y() + 0.5F), 0, image.rows - 1);
     const std::uint8_t* pixel = image.ptr<std::uint8_t>(row) + column * channels;
     frame.colours[i] = {pixel[red], pixel[1], pixel[blue]};
   }

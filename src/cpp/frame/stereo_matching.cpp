@@ -164,7 +164,9 @@ void remove_outliers(std::vector<std::pair<int, std::uint32_t>>& sads, StereoMat
   }
 }
 
-void check(const Extraction& extraction, const ScalePyramid& scales, const char* side) {
+}  // namespace
+
+void check_extraction(const Extraction& extraction, const ScalePyramid& scales, const char* side) {
   const auto levels = static_cast<int>(extraction.pyramid.levels.size());
   const auto fail = [side](const std::string& text) {
     throw ImageError(std::string(side) + " extraction: " + text);
@@ -184,12 +186,10 @@ void check(const Extraction& extraction, const ScalePyramid& scales, const char*
   }
 }
 
-}  // namespace
-
 StereoMatches match_stereo(const Extraction& left, const Extraction& right,
                            const ScalePyramid& scales, double bf, double max_disparity) {
-  check(left, scales, "left");
-  check(right, scales, "right");
+  check_extraction(left, scales, "left");
+  check_extraction(right, scales, "right");
   if (left.pyramid.levels.size() != right.pyramid.levels.size()) {
     throw ImageError("left and right pyramid have different numbers of levels");
   }

@@ -12,6 +12,9 @@ struct StereoMatches {
   std::vector<float> depth;    ///< metres, -1: none
 };
 
+/// Throws ImageError that names the side unless the pyramid has the levels of all keypoints.
+void check_extraction(const Extraction& extraction, const ScalePyramid& scales, const char* side);
+
 /// Depth of the left keypoints of a rectified pair: descriptor search along rows, sliding 11x11
 /// SAD window on the keypoint's level, parabola for the sub-pixel shift, removal of matches whose
 /// SAD is above 2.1 times the median. bf in pixel metre, max_disparity in pixels (fx: depth of at

@@ -38,8 +38,9 @@ bool reprojection_agrees(const Frame& frame, std::size_t keypoint, const ImagePo
   double gate = kFuseMonoGate;
   if (frame.has_depth(keypoint)) {
     // Disparities are not those of the lens.
+    const double along = frame.camera->along_epipolar_curve(off, feature.x, feature.y);
     const double error_right =
-        off.x() + (image.right_u - image.u) - (frame.right_u[keypoint] - feature.x);
+        along + (image.right_u - image.u) - (frame.right_u[keypoint] - feature.x);
     error += error_right * error_right;
     gate = kFuseStereoGate;
   }

@@ -27,7 +27,13 @@ Eigen::Vector3d PairTriangulation::View::ray(std::size_t i) const {
 // Cosine of the angle under which the baseline is seen from the measured depth.
 double PairTriangulation::View::depth_parallax(std::size_t i, double none) const {
   if (!frame->has_depth(i)) return none;
-  return std::cos(2.0 * std::atan2(frame->camera->baseline() / 2.0, frame->depth[i]));
+  const Camera& camera = *frame->camera;
+  if (camera.has_wide_pair()) {  // of the part of the baseline across the ray
+    const Keypoint& keypoint = frame->keypoints[i];
+    const double disparity = camera.disparity(keypoint.x, keypoint.y, frame->depth[i]);
+    return std::cos(2.0 * std::atan(disparity / camera.pixels_per_radian() / 2.0));
+  }
+  return std::cos(2.0 * std::atan2(camera.baseline() / 2.0, frame->depth[i]));
 }
 
 bool PairTriangulation::View::sees(const Eigen::Vector3d& point, std::size_t i) const {
@@ -38,7 +44,8 @@ bool PairTriangulation::View::sees(const Eigen::Vector3d& point, std::size_t i) 
   double error = off.squaredNorm();
   double gate = kMonoGate;
   if (frame->has_depth(i)) {
-    const double error_right = frame->camera->right_error(p_c, off, keypoint.x, frame->right_u[i]);
+    const double error_right =
+        frame->camera->right_error(p_c, off, keypoint.x, keypoint.y, frame->right_u[i]);
     error += error_right * error_right;
     gate = kStereoGate;
   }

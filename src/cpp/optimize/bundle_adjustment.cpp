@@ -46,7 +46,7 @@ std::vector<double> judge(const BundleProblem& problem) {
     }
     double squared = error.squaredNorm();
     if (o.has_depth) {
-      const double right = camera.model->right_error(p, error, o.u, o.right_u);
+      const double right = camera.model->right_error(p, error, o.u, o.v, o.right_u);
       squared += static_cast<double>(o.right_factor) * (right * right);
     }
     const double whitened = static_cast<double>(o.inverse_sigma2) * squared;

@@ -32,15 +32,13 @@ inline void compare(const Observations& o, Size i, const Lanes (&p)[3], Sight& s
   }
   const Lanes tiny2 = all(kTinyDepth * kTinyDepth);
   const Lanes weight_u = load(o.weight_u + i), weight_right = load(o.weight_right + i);
-  Mask deep = weight_right <= all(0);
-  deep |= p[2] * p[2] > tiny2;
-  const Mask on = (weight_u > all(0)) & (q[2] * q[2] > tiny2) & deep;
+  const Mask on = (weight_u > all(0)) & (q[2] * q[2] > tiny2);
   s.p = {keep(on, p[0]), keep(on, p[1]), keep(on, p[2])};
   s.weight_u = keep(on, weight_u);
   s.weight_v = keep(on, load(o.weight_v + i));
   s.weight_right = keep(on, weight_right);
   s.inverse_q = keep(on, all(1) / q[2]);
-  s.inverse_z = keep(s.weight_right > all(0), all(1) / p[2]);
+  s.inverse_z = keep(s.weight_right > all(0), s.inverse_q);
   s.x = keep(on, q[0]) * s.inverse_q;
   s.y = keep(on, q[1]) * s.inverse_q;
   s.base = load(o.base + i);
@@ -130,7 +128,8 @@ inline Normal normal_equations_of_sights(const Sight& s) {
   }
   add_row(n, row_u, s.weight_u, s.error_u);
   add_row(n, row_v, s.weight_v, s.error_v);
-  row_u[2] += s.base * s.inverse_z * s.inverse_z;
+  const Lanes by_q = s.base * s.inverse_z * s.inverse_z;
+  for (int k = 0; k < 3; ++k) row_u[k] += by_q * s.B[2][k];
   add_row(n, row_u, s.weight_right, s.error_right);
   return n;
 }

@@ -26,9 +26,11 @@ CameraRow pixel_row(const BundleMeasurement& m, int row) {
 CameraRow row_u(const BundleMeasurement& m) { return pixel_row(m, 0); }
 CameraRow row_v(const BundleMeasurement& m) { return pixel_row(m, 1); }
 CameraRow row_right(const BundleMeasurement& m) {
-  CameraRow row = row_u(m);
-  row.c += m.factor * m.view->camera().bf() / (m.p_c[2] * m.p_c[2]);
-  return {m.right_scale * row.a, m.right_scale * row.b, m.right_scale * row.c};
+  const CameraRow row = row_u(m);
+  const double by_q = m.factor * m.view->camera().bf() * m.inverse_q * m.inverse_q;
+  return {m.right_scale * (row.a + by_q * m.sight(2, 0)),
+          m.right_scale * (row.b + by_q * m.sight(2, 1)),
+          m.right_scale * (row.c + by_q * m.sight(2, 2))};
 }
 
 /// Derivative of the residual (minus the prediction) with respect to the six camera parameters.
@@ -97,8 +99,7 @@ double BundleMeasurement::evaluate() {
     p_c[i] = R(i, 0) * point[0] + R(i, 1) * point[1] + R(i, 2) * point[2] + t(i);
   }
   const double q = sight(2, 0) * p_c[0] + sight(2, 1) * p_c[1] + sight(2, 2) * p_c[2];
-  const bool usable =
-      scale > 0 && std::abs(q) > kTinyDepth && !(has_depth && !(std::abs(p_c[2]) > kTinyDepth));
+  const bool usable = scale > 0 && std::abs(q) > kTinyDepth;
   if (!usable) {  // also when the point is NaN
     std::fill_n(p_c, 3, 0.0);
     p_c[2] = 1;
@@ -114,7 +115,7 @@ double BundleMeasurement::evaluate() {
         (sight(row, 0) * p_c[0] + sight(row, 1) * p_c[1] + sight(row, 2) * p_c[2]) * inverse_q;
     residual[row] = -factor * predicted[row];
   }
-  const double disparity_error = view->camera().bf() / p_c[2] - (u - right_u);
+  const double disparity_error = view->camera().bf() * inverse_q - (u - right_u);
   residual[2] = has_depth ? right_scale * (factor * (disparity_error - predicted[0])) : 0.0;
   if (huber == 0) return 0;
   const double square =

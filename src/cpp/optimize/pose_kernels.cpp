@@ -123,7 +123,17 @@ double chi2(const Group& group, std::size_t i, bool stereo, const Camera& camera
   }
   double squared = error.squaredNorm();
   if (stereo) {
-    const double error_r = camera.right_error(p, error, group.u[i], group.right_u[i]);
+    double error_r = 0;
+    if (camera.is_flat()) {
+      error_r = camera.right_error(p, error, group.u[i], group.v[i], group.right_u[i]);
+    } else {  // as right_error() has it, with the sight that is known
+      double q[3];
+      for (std::size_t row = 0; row < 3; ++row) {
+        q[row] = group.sight[3 * row][i] * p.x() + group.sight[3 * row + 1][i] * p.y() +
+                 group.sight[3 * row + 2][i] * p.z();
+      }
+      error_r = (q[0] - camera.bf()) / q[2] + (group.u[i] - group.right_u[i]);
+    }
     squared += error_r * error_r;
   }
   return group.inverse_sigma2[i] * squared;

@@ -115,7 +115,7 @@ inline void add_general_row(Sums& sums, const CameraPoints& p, Lanes a, Lanes b,
 }
 
 /// Any camera: the error of a point p against its keypoint is (B.row(0) p, B.row(1) p) /
-/// (B.row(2) p) in pixels, with B the keypoint's sight.
+/// (B.row(2) p) in pixels, with B the keypoint's sight, and its disparity is bf / (B.row(2) p).
 template <bool kStereo, bool kRobust, bool kSystem>
 inline double accumulate_sights(const Task& task, Size first, double* system) {
   const Lanes huber2 = all(task.huber * task.huber), width = all(task.huber);
@@ -129,18 +129,17 @@ inline double accumulate_sights(const Task& task, Size first, double* system) {
     Lanes B[9];
     for (Size k = 0; k < 9; ++k) B[k] = load(task.sight[k] + i);
     const Lanes q = B[6] * p.x + B[7] * p.y + B[8] * p.z;
-    const Mask usable = kStereo ? (q * q > tiny2) & (p.z * p.z > tiny2) : q * q > tiny2;
+    const Mask usable = q * q > tiny2;
     const Lanes inverse = keep(usable, one / q);
     Lanes weight = keep(usable, load(task.weight + i));
     // Measurement minus prediction.
     const Lanes error_u = -(B[0] * p.x + B[1] * p.y + B[2] * p.z) * inverse;
     const Lanes error_v = -(B[3] * p.x + B[4] * p.y + B[5] * p.z) * inverse;
-    Lanes error_r = all(0.0), inverse_z = all(0.0);
+    Lanes error_r = all(0.0);
     Lanes square = error_u * error_u + error_v * error_v;
     if constexpr (kStereo) {
-      inverse_z = keep(usable, one / p.z);
       const Lanes disparity = load(task.u + i) - load(task.right_u + i);
-      error_r = error_u - disparity + bf * inverse_z;
+      error_r = error_u - disparity + bf * inverse;
       square += error_r * error_r;
     }
     square *= weight;
@@ -160,7 +159,9 @@ inline double accumulate_sights(const Task& task, Size first, double* system) {
                       -(B[4] + error_v * B[7]) * inverse, -(B[5] + error_v * B[8]) * inverse,
                       weight, error_v);
       if constexpr (kStereo) {
-        add_general_row(sums, p, ua, ub, uc - bf * inverse_z * inverse_z, weight, error_r);
+        const Lanes by_q = bf * inverse * inverse;
+        add_general_row(sums, p, ua - by_q * B[6], ub - by_q * B[7], uc - by_q * B[8], weight,
+                        error_r);
       }
     }
   }

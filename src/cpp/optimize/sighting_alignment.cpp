@@ -111,9 +111,10 @@ void SightingAlignment::begin_round() {
     if (!point.has_patch) return;
     const auto& o = problem.observations[point.reference];
     const Pose& T_cw = problem.cameras[o.camera].T_cw;
-    const double z = (T_cw * problem.points[k]).z();
-    point.surface = parallel_patch(*frame_of(o).camera, T_cw.inverse(),
-                                   raw_of(point.reference).cast<double>(), z);
+    const Eigen::Vector3d p_c = T_cw * problem.points[k];
+    const Camera& camera = *frame_of(o).camera;
+    point.surface = parallel_patch(camera, T_cw.inverse(), raw_of(point.reference).cast<double>(),
+                                   camera.is_flat() ? p_c.z() : p_c.norm());
   });
 }
 
@@ -145,8 +146,9 @@ void SightingAlignment::align_one(std::size_t observation, const Pyramids& image
   if (point.reference != observation) {
     sighting.left = match(point, frame, T_cw, images.left, start);
   }
-  // The two images of a pair are rectified: what is raw and what is not are the same.
-  if (images.right.levels.empty() || !o.has_depth || frame.camera->distorts()) return;
+  // The two images of a pair are rectified: what is raw and what is not are the same. The right
+  // camera of a fisheye pair is not known here.
+  if (images.right.levels.empty() || !o.has_depth || !frame.camera->is_pinhole()) return;
   const Pose T_rc(Eigen::Matrix3d::Identity(), {-frame.camera->baseline(), 0, 0});
   sighting.right = match(point, frame, T_rc * T_cw, images.right, {sighting.right_u, start.y()});
 }

@@ -9,11 +9,10 @@ from enum import Enum
 from pathlib import Path
 
 from orbslam2py._arguments import cannot_open, is_whole, member_of, path_of, shown
-from orbslam2py.calibration.camera_model import camera_settings
 from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile, ForeignCamera
-from orbslam2py.calibration.foreign_pairs import Pair, pair_settings
+from orbslam2py.calibration.foreign_pairs import Pair, pair_settings, raw_camera
 from orbslam2py.calibration.formats import READERS
-from orbslam2py.calibration.lenses import UNIFIED, require_supported
+from orbslam2py.calibration.lenses import require_supported
 from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
@@ -285,18 +284,11 @@ def _settings_of(
     if isinstance(chosen, Pair):
         for one in (chosen.left, chosen.right):
             where = f"{what}: {_called(file, one)}"
-            require_supported(where, one.lens, Sensor.STEREO, chosen.alone)
+            require_supported(where, one.lens)
         return pair_settings(chosen, fps)
     where = f"{what}: {_called(file, chosen)}"
-    require_supported(where, chosen.lens, sensor or Sensor.MONOCULAR)
-    assert chosen.K is not None
-    model, lens = chosen.lens, chosen.lens_numbers
-    if model == UNIFIED:
-        model, lens = "eucm", (*lens, 1.0)
-    camera = camera_settings(
-        chosen.K, chosen.distortion, chosen.size, fps=fps, rgb=file.rgb, model=model, lens=lens
-    )
-    return settings_for_camera(camera, Sensor.MONOCULAR)
+    require_supported(where, chosen.lens)
+    return settings_for_camera(raw_camera(chosen, fps, rgb=file.rgb), Sensor.MONOCULAR)
 
 
 def _called(file: CameraFile, camera: ForeignCamera) -> str:
@@ -336,6 +328,10 @@ def _with_baseline(path: Path, settings: Settings, baseline: float | None) -> Se
         return settings
     if likely:
         raise SettingsError(f"{path} tells the baseline, {found:.4g} m; leave --baseline out")
+    if settings.right is not None:
+        T = settings.right.T_left_right.copy()
+        T[:3, 3] *= baseline / found
+        return replace(settings, right=replace(settings.right, T_left_right=T))
     bf = settings_for_camera(settings.camera, Sensor.STEREO, baseline=baseline).camera.bf
     pair = settings.rectification
     if pair is not None:

@@ -14,8 +14,10 @@ from orbslam2py.settings import CameraSettings
 from orbslam2py.settings.fit import MEASURE, FitThresholds, Misfit
 
 
-def find_pair_misfit(rows: list[PairRows], limits: FitThresholds) -> Misfit | None:
-    """Judge a rectified pair by the rows and disparities of its first images.
+def find_pair_misfit(
+    rows: list[PairRows], limits: FitThresholds, *, fisheye: bool = False
+) -> Misfit | None:
+    """Judge a rectified pair by the rows and disparities of its first images, or a fisheye pair.
 
     Parameters
     ----------
@@ -23,9 +25,21 @@ def find_pair_misfit(rows: list[PairRows], limits: FitThresholds) -> Misfit | No
         What was measured, one entry or more.
     limits : FitThresholds
         The limits; more than half of the images must be beyond them.
+    fisheye : bool
+        Whether `rows` are distances from epipolar curves.
     """
     difference = float(np.median([one.row_difference for one in rows]))
     wrong = float(np.median([one.wrong_sign for one in rows]))
+    if fisheye and (difference > limits.rows or wrong > limits.wrong_sign):
+        seen = f"lie {difference:.1f} pixels beside their epipolar curves in the right image"
+        if wrong > limits.wrong_sign:
+            seen += f", and {100 * wrong:.0f} % of them on the wrong side of infinity"
+        return Misfit(
+            f"points of the left image {seen}",
+            "left and right image are swapped or not taken at one time, or Stereo.T_c1_c2 is of "
+            "another pair, or inverse",
+            "exchange left and right, synchronise the cameras, or calibrate this pair",
+        )
     if difference > limits.rows:
         return Misfit(
             f"the rows of the same points in left and right image differ by {difference:.1f} "

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.calibration.camera_model import camera_settings
 from orbslam2py.calibration.foreign_cameras import CameraFile, ForeignCamera
-from orbslam2py.datasets.rectification import rectification_of_pair
+from orbslam2py.calibration.lenses import PINHOLE, UNIFIED
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import (
     CameraRectification,
@@ -24,6 +25,7 @@ from orbslam2py.settings import (
     settings_for_camera,
 )
 from orbslam2py.settings.defaults import usual_n_features
+from orbslam2py.settings.pair_cameras import PairCameras, cameras_of_pair
 from orbslam2py.settings.pair_views import compare_views
 
 #: Part of the views that overlaps below which cameras see nothing together.
@@ -64,12 +66,12 @@ class Pair:
 
 
 def pair_settings(pair: Pair, fps: float) -> Settings:
-    """Make settings of a pair, with its rectification unless it is rectified already.
+    """Make settings of a pair: rectified already, with its rectification, or of fisheye cameras.
 
     Parameters
     ----------
     pair
-        The cameras, both pinhole cameras.
+        The cameras, with supported lenses.
     fps
         Images per second.
 
@@ -81,10 +83,24 @@ def pair_settings(pair: Pair, fps: float) -> Settings:
     if pair.file.rectified:
         return _rectified_pair(pair, fps)
     size = _common_size(pair)
-    if pair.left.P is not None and pair.right.P is not None:
-        rectification = _given_rectification(pair, size)
+    if pair.left.P is not None and pair.right.P is not None and not _is_fisheye_pair(pair):
+        found = _of_given_rectification(pair, size, fps)
     else:
-        rectification = _found_rectification(pair, size)
+        found = _found_pair(pair, size, fps)
+    return Settings(
+        sensor=Sensor.STEREO,
+        **found.fields,
+        orb=OrbSettings(n_features=usual_n_features(*size)),
+        depth=builtin_settings("euroc", Sensor.STEREO).depth,
+    )
+
+
+def _is_fisheye_pair(pair: Pair) -> bool:
+    return any(one.lens != PINHOLE for one in (pair.left, pair.right))
+
+
+def _of_given_rectification(pair: Pair, size: tuple[int, int], fps: float) -> PairCameras:
+    rectification = _given_rectification(pair, size)
     P, P_right = rectification.left.P, rectification.right.P
     camera = CameraSettings(
         fx=float(P[0, 0]),
@@ -96,12 +112,17 @@ def pair_settings(pair: Pair, fps: float) -> Settings:
         fps=fps,
         bf=-float(P_right[0, 3]),
     )
-    return Settings(
-        sensor=Sensor.STEREO,
-        camera=camera,
-        orb=OrbSettings(n_features=usual_n_features(*size)),
-        depth=builtin_settings("euroc", Sensor.STEREO).depth,
-        rectification=rectification,
+    return PairCameras(camera, rectification=rectification)
+
+
+def raw_camera(one: ForeignCamera, fps: float, *, rgb: bool = False) -> CameraSettings:
+    """Make the settings of a camera as it is, with its lens."""
+    assert one.K is not None
+    model, lens = one.lens, one.lens_numbers
+    if model == UNIFIED:
+        model, lens = "eucm", (*lens, 1.0)
+    return camera_settings(
+        one.K, one.distortion, one.size, fps=fps, rgb=rgb, model=model, lens=lens
     )
 
 
@@ -150,7 +171,7 @@ def _common_size(pair: Pair) -> tuple[int, int]:
 
 
 # ---- rectification -------------------------------------------------------------------------------
-def _found_rectification(pair: Pair, size: tuple[int, int]) -> StereoRectification:
+def _found_pair(pair: Pair, size: tuple[int, int], fps: float) -> PairCameras:
     left, right, key = pair.left, pair.right, pair.file.place_key
     assert left.K is not None
     assert right.K is not None
@@ -162,12 +183,12 @@ def _found_rectification(pair: Pair, size: tuple[int, int]) -> StereoRectificati
     for camera, K in ((left, left.K), (right, right.K)):
         _require_centre_inside(pair.where, camera.name, K, size)
     T = right.T_camera_rig @ np.linalg.inv(left.T_camera_rig)
-    _require_overlap(pair, (left.K, right.K), size, T[:3, :3])
+    if not _is_fisheye_pair(pair):
+        _require_overlap(pair, (left.K, right.K), size, T[:3, :3])
     _require_side_by_side(pair, T)
     try:
-        return rectification_of_pair(
-            (left.K, right.K), (left.distortion, right.distortion), T, size
-        )
+        cameras = (raw_camera(one, fps) for one in (left, right))
+        return cameras_of_pair(*cameras, T, size, key)
     except SettingsError as error:
         raise SettingsError(
             f"{pair.where}: the pair cannot be rectified ({error}); look at intrinsics, distortion "

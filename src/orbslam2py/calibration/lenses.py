@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
-from orbslam2py.settings.fisheye import PINHOLE, fisheye_model, no_fisheye_pair, plain_name
+from orbslam2py.settings.fisheye import PINHOLE, fisheye_model, plain_name
 from orbslam2py.settings.foreign import new_line
 
 __all__ = ["PINHOLE", "UNIFIED", "lens_of", "require_supported"]
@@ -69,7 +69,7 @@ def lens_of(where: str, what: str, name: object) -> str:
     return lens
 
 
-def require_supported(where: str, lens: str, sensor: Sensor, alone: str = "") -> None:
+def require_supported(where: str, lens: str) -> None:
     """Raise `SettingsError` unless a lens is supported; it says what to do instead.
 
     Parameters
@@ -78,19 +78,10 @@ def require_supported(where: str, lens: str, sensor: Sensor, alone: str = "") ->
         The file, and the camera in it, for the message.
     lens
         As `lens_of` returns it.
-    sensor
-        What settings are wanted for.
-    alone
-        How to take one camera of the file, for the message about a pair.
     """
     if lens in _UNSUPPORTED:
         raise SettingsError(
             f"{where} is {_UNSUPPORTED[lens]}, which is not supported; {_remedy(lens)}"
-        )
-    if lens != PINHOLE and sensor is Sensor.STEREO:
-        pair = no_fisheye_pair(alone) if alone else no_fisheye_pair()
-        raise SettingsError(
-            f"{where} is a fisheye camera ({lens}), and {pair}:\n    {new_line(sensor)}"
         )
 
 

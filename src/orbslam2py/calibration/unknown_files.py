@@ -40,7 +40,7 @@ def refuse_unknown(source: CalibrationSource) -> NoReturn:
         if match and match[1].lower() not in ("pinhole", "rectified"):
             lens = lens_of(str(path), "Camera.type", match[1])
             what = f"{path} is a settings file of ORB-SLAM3: its camera"
-            require_supported(what, lens, Sensor.MONOCULAR)
+            require_supported(what, lens)
         raise SettingsError(
             f"{path} is a settings file already, not another program's calibration; give it with "
             f"--settings, and look at it with orbslam2py settings check {path}"
@@ -52,7 +52,7 @@ def refuse_unknown(source: CalibrationSource) -> NoReturn:
         raise SettingsError(f"{path} is no camera file we know: it is empty; give a calibration")
     values = _values(source)
     for place, lens in _lenses(values):
-        require_supported(f"{path} is no camera file we know, and {place}", lens, Sensor.MONOCULAR)
+        require_supported(f"{path} is no camera file we know, and {place}", lens)
     found = [] if _OTHER_LENS.search(text) else list(_numbers(values))
     if len(found) == 1:
         place, camera = found[0]

@@ -130,7 +130,8 @@ Lens = Annotated[
     typer.Option(
         metavar="SETTINGS",
         help="Settings file of a camera through whose lens the images are seen: any camera model, "
-        "fisheye lenses as well. With --sensor mono or rgbd.",
+        "fisheye lenses as well. With --sensor stereo of a raw pair (Camera2.*, or LEFT.* and "
+        "RIGHT.*): raw images of both cameras.",
     ),
 ]
 
@@ -183,6 +184,7 @@ def synthesize(
     """Write a synthetic sequence with calibration and exact ground truth."""
     if depth_noise and sensor is not Sensor.RGBD:
         raise SettingsError("--depth-noise is of depth images: --sensor rgbd")
+    pair = sensor is Sensor.STEREO
     options = SyntheticOptions(
         world=world,
         sensor=sensor,
@@ -207,7 +209,8 @@ def synthesize(
         overlap=overlap,
         lateral=lateral,
         yaw=yaw,
-        lens=None if lens is None else Settings.load(lens, Sensor.MONOCULAR).camera,
+        lens=None if lens is None or pair else Settings.load(lens, Sensor.MONOCULAR).camera,
+        lens_pair=Settings.load(lens, Sensor.STEREO) if lens is not None and pair else None,
         imu=imu,
         imu_noise=imu_noise,
     )

@@ -115,7 +115,7 @@ class EurocSequence(RecordedSequence):
         super().__init__(folder, available, sensor, settings)
         if self.name == "mav0":
             self.name = folder.resolve().parent.name
-        if self._chosen is not None and self.sensor is Sensor.STEREO:
+        if self._chosen is not None and self._rectifies:
             _ = self._rectification  # tells at once if the chosen settings have none
         rate = self.known_rate() or _USUAL_RATE
         left = _list_images(root / "cam0", rate)
@@ -147,7 +147,7 @@ class EurocSequence(RecordedSequence):
         return self._left[index], self._right[index]
 
     def ground_truth(self) -> Trajectory | None:
-        """Read the body's poses and move them to the (rectified) left camera.
+        """Read the body's poses and move them to the left camera, rectified if it is.
 
         See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing
         or has no ``T_BS``: the camera's place on the vehicle is unknown then.
@@ -165,7 +165,7 @@ class EurocSequence(RecordedSequence):
             return None
         body = read_euroc(path)
         T_body_camera = sensor.T_BS.copy()
-        if self.sensor is Sensor.STEREO:
+        if self._rectifies:
             rectification = self._rectification
             # R of the rectification turns raw into rectified coordinates.
             T_body_camera[:3, :3] = T_body_camera[:3, :3] @ rectification.left.R.T
@@ -184,13 +184,20 @@ class EurocSequence(RecordedSequence):
         return super().imu_settings()
 
     @cached_property
-    def _rectifiers(self) -> tuple[Rectifier, Rectifier]:
+    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
+        if not self._rectifies:
+            return None
         rectification = self._rectification
         return Rectifier(rectification.left), Rectifier(rectification.right)
 
     @property
+    def _rectifies(self) -> bool:
+        """Whether images are rectified: those of a fisheye pair stay as they are."""
+        return self.sensor is Sensor.STEREO and self.settings.right is None
+
+    @property
     def _rectification(self) -> StereoRectification:
-        if self.settings.rectification is None:
+        if self.settings.rectification is None:  # of a fisheye pair there is none
             raise SettingsError(
                 f"calibration parameters to rectify stereo are missing for {self.folder}: add "
                 "LEFT.* and RIGHT.* to the settings, use the built-in 'euroc', or give no settings "

@@ -11,8 +11,7 @@ import numpy as np
 
 from orbslam2py._arguments import cannot_open
 from orbslam2py._arrays import FloatArray
-from orbslam2py.datasets.rectification import rectification_of_pair
-from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.errors import DatasetError
 from orbslam2py.settings import (
     CameraSettings,
     OrbSettings,
@@ -20,10 +19,10 @@ from orbslam2py.settings import (
     Settings,
     builtin_settings,
 )
-from orbslam2py.settings.fisheye import no_fisheye_pair
 from orbslam2py.settings.groups import DISTORTION_FIELDS
 from orbslam2py.settings.keys import focal_problems
 from orbslam2py.settings.opencv_yaml import Entry, parse_number, read_matrix, scan
+from orbslam2py.settings.pair_cameras import cameras_of_pair
 from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
 
 
@@ -158,40 +157,18 @@ def monocular_settings(camera: SensorCalibration) -> Settings:
 
 
 def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settings:
-    """Make settings for the pair, with the rectification that makes its images fit them.
+    """Make settings for the pair: with its rectification, or of fisheye cameras as they are.
 
     Raises
     ------
     SettingsError
-        If it is a pair of fisheye cameras, or cannot be rectified.
+        If the two are no pair.
     """
-    if left.is_fisheye or right.is_fisheye:
-        raise SettingsError(no_fisheye_pair())
-    rectification = rectification_of_pair(
-        (left.camera_matrix, right.camera_matrix),
-        (left.distortion, right.distortion),
-        inverse_poses(right.T_BS) @ left.T_BS,
-        left.size,
-    )
-    P = rectification.left.P
+    T_right_left = inverse_poses(right.T_BS) @ left.T_BS
+    cameras = monocular_settings(left).camera, monocular_settings(right).camera
+    pair = cameras_of_pair(*cameras, T_right_left, left.size, "T_BS of both cameras")
     published = builtin_settings("euroc", Sensor.STEREO)
-    return Settings(
-        sensor=Sensor.STEREO,
-        camera=CameraSettings(
-            fx=float(P[0, 0]),
-            fy=float(P[1, 1]),
-            cx=float(P[0, 2]),
-            cy=float(P[1, 2]),
-            width=left.size[0],
-            height=left.size[1],
-            fps=left.rate,
-            bf=-float(rectification.right.P[0, 3]),
-            rgb=True,
-        ),
-        orb=published.orb,
-        depth=published.depth,
-        rectification=rectification,
-    )
+    return Settings(sensor=Sensor.STEREO, **pair.fields, orb=published.orb, depth=published.depth)
 
 
 def _rigid(path: Path, entry: Entry) -> FloatArray:

@@ -30,7 +30,7 @@ from orbslam2py.datasets.grey_scale import (
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.imu import ImuSamples
 from orbslam2py.datasets.imu_csv import read_imu_csv
-from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of, with_rectified_images
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import (
     ImuSettings,
@@ -92,8 +92,9 @@ class RecordedSequence(FramesInOrder, ABC):
 
     @cached_property
     def settings(self) -> Settings:
-        """The settings the caller chose, or `default_settings`."""
-        return self.default_settings() if self._chosen is None else self._chosen
+        """The settings the caller chose, or `default_settings`; pairs come rectified by them."""
+        chosen = self.default_settings() if self._chosen is None else self._chosen
+        return with_rectified_images(chosen)
 
     def default_settings(self) -> Settings:
         """Choose by what is in the folder; see `choose_settings`."""

@@ -3,19 +3,26 @@
 
 from __future__ import annotations
 
-import cv2
+from dataclasses import replace
+
 import numpy as np
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.errors import ImageError
 from orbslam2py.settings import CameraRectification, Settings
-from orbslam2py.settings.rectify import rectification_of_pair
+from orbslam2py.settings.rectify import core_rectifier, rectification_of_pair
 
-__all__ = ["Rectifier", "Rectifiers", "rectification_of_pair", "rectifiers_of"]
+__all__ = [
+    "Rectifier",
+    "Rectifiers",
+    "rectification_of_pair",
+    "rectifiers_of",
+    "with_rectified_images",
+]
 
 
 class Rectifier:
-    """Rectifies the images of one camera of a pair.
+    """Rectifies the images of one camera of a pair, as `orbslam2py.System` does.
 
     Parameters
     ----------
@@ -25,14 +32,7 @@ class Rectifier:
 
     def __init__(self, camera: CameraRectification) -> None:
         self._size = (camera.height, camera.width)
-        self._maps = cv2.initUndistortRectifyMap(
-            camera.K,
-            camera.D,
-            camera.R,
-            camera.P[:, :3],
-            (camera.width, camera.height),
-            cv2.CV_32FC1,
-        )
+        self._rectifier = core_rectifier(camera)
 
     def rectify(self, image: ByteArray, what: object = "image") -> ByteArray:
         """Resample an image bilinearly; black where the raw image has no pixels.
@@ -55,10 +55,7 @@ class Rectifier:
                 f"{what} is {image.shape[1]} x {image.shape[0]}, but the rectification is for "
                 f"{width} x {height}"
             )
-        rectified = cv2.remap(
-            image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
-        )
-        return np.asarray(rectified, dtype=np.uint8)
+        return self._rectifier.rectify(np.ascontiguousarray(image))
 
 
 #: Of the left and of the right camera.
@@ -69,3 +66,11 @@ def rectifiers_of(settings: Settings) -> Rectifiers | None:
     """Make what rectifies the images of a pair; None if its images are rectified already."""
     pair = settings.rectification
     return None if pair is None else (Rectifier(pair.left), Rectifier(pair.right))
+
+
+def with_rectified_images(settings: Settings) -> Settings:
+    """Return the settings for images that were rectified by them, so that no one does it again."""
+    pair = settings.rectification
+    if pair is None or pair.applied:
+        return settings
+    return replace(settings, rectification=replace(pair, applied=True))

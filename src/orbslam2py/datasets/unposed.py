@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from orbslam2py.datasets.base import Images, Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.preparation import Preparation
+from orbslam2py.datasets.rectification import with_rectified_images
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
@@ -62,6 +63,7 @@ class UnposedSource:
         self.settings: Settings = resolve_settings(settings, self.sensor)
         if fps is not None:
             self.settings = replace(self.settings, camera=with_rate(self.settings.camera, fps))
+        self.settings = with_rectified_images(self.settings)
         self._preparation = Preparation(what, self.sensor, self.settings, split=split)
 
     def ground_truth(self) -> Trajectory | None:

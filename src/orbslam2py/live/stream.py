@@ -13,6 +13,7 @@ from dataclasses import replace
 from orbslam2py.datasets.base import FrameTimes, LiveFrame
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.preparation import Preparation
+from orbslam2py.datasets.rectification import with_rectified_images
 from orbslam2py.datasets.unposed import no_settings, with_rate
 from orbslam2py.errors import DatasetError, StateError
 from orbslam2py.live.device import Device, Stream
@@ -103,6 +104,7 @@ class LiveStream:
         self.settings: Settings = resolve_settings(chosen, self.sensor)
         if fps is not None:
             self.settings = replace(self.settings, camera=with_rate(self.settings.camera, fps))
+        self.settings = with_rectified_images(self.settings)
         self.imu_settings: ImuSettings | None = (
             device.imu_settings() if "imu" in device.streams else None
         )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 import logging
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,12 @@ from orbslam2py import _core as core
 from orbslam2py._arguments import shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py.calibration.data_misfit import find_data_misfit, find_pair_misfit
-from orbslam2py.calibration.pair_rows import PairRows, disparities_of, measure_rows
+from orbslam2py.calibration.pair_rows import PairRows, disparities_of, measure_curves, measure_rows
 from orbslam2py.calibration.self_calibration import CalibrationGains, calibration_gains
 from orbslam2py.calibration.tracks import PointTracker, TrackedPair
 from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.datasets.base import Images
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.errors import OrbSlamError, SettingsError
 from orbslam2py.settings.comparison import compare_calibrations
 from orbslam2py.settings.depth_check import is_known
@@ -90,6 +91,7 @@ class CalibrationWatch:
         self._n_seen = 0
         self._size = (0, 0)
         self._begun: dict[int, Images] = {}
+        self._rectifiers: Rectifiers | None = None
         self.rows: list[PairRows] = []
         self.gains: CalibrationGains | None = None
         self._pairs: list[_MovedPair] = []
@@ -100,6 +102,7 @@ class CalibrationWatch:
         """Take the next images of the run; they have been tracked, so they are good ones."""
         if self._done:
             return
+        images = self._as_tracked(images)
         if self._n_seen == 0:
             self._size = images.image.shape[1], images.image.shape[0]
             self._tell(self._misfit_of_size())
@@ -132,17 +135,38 @@ class CalibrationWatch:
         for pair in self._tracker.add(grey, images.mask):
             self._keep(pair)
 
+    def _as_tracked(self, images: Images) -> Images:
+        """Rectify a pair that the system rectifies as well."""
+        pair = self._settings.rectification
+        if pair is None or pair.applied or images.right is None:
+            return images
+        if self._rectifiers is None:
+            self._rectifiers = rectifiers_of(self._settings)
+        assert self._rectifiers is not None
+        left, right = self._rectifiers
+        return replace(
+            images, image=left.rectify(images.image), right=right.rectify(images.right), mask=None
+        )
+
     def _grey(self, image: ByteArray) -> ByteArray:
         return core.to_grey(image, self._settings.camera.rgb)
 
     def _measure_rows(self, grey: ByteArray, images: Images) -> None:
         if images.right is None or len(self.rows) == _N_ROWS:
             return
-        rows = measure_rows(grey, self._grey(images.right))
+        right = self._grey(images.right)
+        if self._settings.right is not None:
+            rows = measure_curves(grey, right, self._settings)
+        else:
+            rows = measure_rows(grey, right)
         if rows is not None:
             self.rows.append(rows)
         if len(self.rows) == _N_ROWS:
-            self._tell(find_pair_misfit(self.rows, self._limits))
+            self._tell(self._misfit_of_pair())
+
+    def _misfit_of_pair(self) -> Misfit | None:
+        fisheye = self._settings.right is not None
+        return find_pair_misfit(self.rows, self._limits, fisheye=fisheye)
 
     def _keep(self, pair: TrackedPair) -> None:
         motion = float(np.median(np.linalg.norm(pair.second - pair.first, axis=1)))
@@ -155,7 +179,7 @@ class CalibrationWatch:
     def _judge(self) -> None:
         self._done = True
         if 0 < len(self.rows) < _N_ROWS:
-            self._tell(find_pair_misfit(self.rows, self._limits))
+            self._tell(self._misfit_of_pair())
         if self._misfit is not None or len(self._pairs) < self._limits.least_pairs:
             return
         if self._in_background:
@@ -186,7 +210,8 @@ class CalibrationWatch:
             depths = images.depth[rows, columns]
             known = np.where(is_known(depths), depths, 0).astype(np.float64)
             return PointPair(first, second, known)
-        if self._sensor is Sensor.STEREO and images.right is not None:
+        fisheye_pair = self._settings.right is not None
+        if self._sensor is Sensor.STEREO and images.right is not None and not fisheye_pair:
             found = disparities_of(self._grey(images.image), self._grey(images.right), first)
             with np.errstate(divide="ignore"):
                 return PointPair(first, second, np.where(found > 0, 1.0 / found, 0.0))

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.builtin import BUILTIN_DATA
+from orbslam2py.settings.fisheye import PINHOLE
 from orbslam2py.settings.fit import FitThresholds, Misfit, known_camera
 from orbslam2py.settings.groups import DISTORTION_FIELDS, CameraSettings
 from orbslam2py.settings.projection import distorted
@@ -84,12 +86,16 @@ def _differences(
 def _raw_cameras(settings: Settings) -> list[CameraSettings]:
     """The cameras of the images as they are on disk: two if the settings rectify them."""
     pair = settings.rectification
+    if settings.right is not None:
+        return [settings.camera, settings.right.camera]
     if pair is None:
         return [settings.camera]
     cameras = []
     for side in (pair.left, pair.right):
         fx, fy, cx, cy = side.K[0, 0], side.K[1, 1], side.K[0, 2], side.K[1, 2]
-        lens = dict(zip(DISTORTION_FIELDS, side.D.tolist(), strict=False))
+        lens: dict[str, Any] = {"model": side.model, "lens": tuple(side.D.tolist())}
+        if side.model == PINHOLE:
+            lens = dict(zip(DISTORTION_FIELDS, side.D.tolist(), strict=False))
         cameras.append(CameraSettings(fx, fy, cx, cy, **lens))
     return cameras
 

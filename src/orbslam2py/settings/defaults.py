@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from orbslam2py._arguments import finite_number, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.fisheye import no_fisheye_pair
+from orbslam2py.settings.fisheye import needs_right_camera
 from orbslam2py.settings.groups import (
     CameraSettings,
     DepthSettings,
@@ -100,7 +100,7 @@ def _check(
     if sensor is not Sensor.STEREO:
         return
     if camera.is_fisheye:
-        raise SettingsError(no_fisheye_pair())
+        raise SettingsError(needs_right_camera())
     if camera.is_distorted:
         raise SettingsError(
             "stereo images must be rectified, and this camera has distortion; give the calibration "

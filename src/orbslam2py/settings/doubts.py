@@ -6,9 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.settings.groups import CameraSettings, DepthSettings, SettingsGroups
+from orbslam2py.settings.fisheye import PINHOLE
+from orbslam2py.settings.groups import CameraSettings, DepthSettings
 from orbslam2py.settings.pair_views import MOST_BASELINE, is_likely_baseline
 from orbslam2py.settings.projection import distorted, largest_radius
+from orbslam2py.settings.right_camera import SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 
 #: Most tangential distortion. Lenses have up to some 0.005.
@@ -36,7 +38,7 @@ def find_doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
         found.append(f"Camera.cy {camera.cy:g} lies outside the image ({camera.height} high)")
     if orb.n_features < 200:
         found.append(f"ORBextractor.nFeatures {orb.n_features} is very few")
-    if sensor is Sensor.STEREO and camera.is_distorted:
+    if sensor is Sensor.STEREO and camera.is_distorted and groups["right"] is None:
         found.append("stereo input must be rectified; distortion must be zero")
     size = camera.width, camera.height
     if camera.is_fisheye:
@@ -45,6 +47,10 @@ def find_doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
         found += _doubts_of_lens("Camera", camera.matrix, camera.distortion, size)
     if sensor.has_depth:
         found += _doubts_of_depth(camera, groups["depth"])
+    right = groups["right"]
+    if right is not None and right.camera.is_fisheye:
+        wrong = _doubts_of_fisheye(right.camera, size)
+        found += [one.replace("Camera:", "Camera2:", 1) for one in wrong]
     return found + _doubts_of_rectification(groups)
 
 
@@ -67,13 +73,14 @@ def _doubts_of_rectification(groups: SettingsGroups) -> list[str]:
                 f"{raw.P[0, 0]:.6g} pixels: is the camera matrix of the same image size "
                 f"({raw.width} x {raw.height}) as the rectification?"
             )
-        found += _doubts_of_lens(name, raw.K, raw.D, (raw.width, raw.height))
+        if raw.model == PINHOLE:
+            found += _doubts_of_lens(name, raw.K, raw.D, (raw.width, raw.height))
     return found
 
 
 def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> list[str]:
     found = []
-    baseline = camera.bf / camera.fx
+    baseline = camera.bf / camera.pixels_per_radian
     if not is_likely_baseline(baseline):
         likely = (
             "is the calibration in millimetres? Then all lengths become 1000 times too long; "

@@ -53,12 +53,13 @@ _NAMES = {
 _MODELS = {name: model for model, names in _NAMES.items() for name in names.split()}
 
 
-def no_fisheye_pair(alone: str = "use one of its cameras alone (--sensor mono)") -> str:
-    """Say that a fisheye pair is not supported, and what is; `alone` is how to take one camera."""
+def needs_right_camera() -> str:
+    """Say what settings of a fisheye pair need."""
     return (
-        f"a stereo pair of fisheye cameras is not supported yet; {alone}, or undistort and rectify "
-        "the pair first (cv2.fisheye.stereoRectify, cv2.fisheye.initUndistortRectifyMap) and make "
-        "settings of the rectified cameras"
+        "a stereo pair of fisheye cameras needs both cameras and how they stand: Camera2.fx, fy, "
+        "cx, cy with the lens, and Stereo.T_c1_c2 (from camera 2 to camera 1, in metres); "
+        "'orbslam2py import-camera --sensor stereo' makes such settings of a calibration of both, "
+        "and --sensor mono uses one camera alone"
     )
 
 

@@ -7,8 +7,7 @@ settings file. The meaning of a key is described at the field it becomes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypedDict
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -316,13 +315,16 @@ class CameraRectification(MadeAgainByCopies):
     K
         Raw camera matrix (3, 3), pixels.
     D
-        Raw distortion, 4, 5, 8 or 12 coefficients.
+        Raw distortion, 4, 5, 8 or 12 coefficients; of a fisheye model its parameters after fx, fy, cx,
+        cy, as `orbslam2py.CameraModel` orders them.
     R
         Rotation (3, 3) from raw to rectified camera coordinates.
     P
         Rectified projection (3, 4), pixels; ``P[0, 3]`` of the right camera is -bf.
     width, height
-        Size of the rectified images in pixels.
+        Size of the images in pixels, raw and rectified.
+    model
+        ``pinhole``, or a fisheye model as in `CameraSettings.model`.
     """
 
     K: FloatArray
@@ -331,8 +333,11 @@ class CameraRectification(MadeAgainByCopies):
     P: FloatArray
     width: int
     height: int
+    model: str = PINHOLE
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "model", checked_model(self.model))
+        pinhole = self.model == PINHOLE
         problems = []
         for name, shape in (("K", (3, 3)), ("D", None), ("R", (3, 3)), ("P", (3, 4))):
             value = numbers_of(getattr(self, name), name, SettingsError).copy()
@@ -341,7 +346,7 @@ class CameraRectification(MadeAgainByCopies):
             object.__setattr__(self, name, value)
             if shape is not None and value.shape != shape:
                 problems.append(f"{name} must be {shape[0]} x {shape[1]}, not {value.shape}")
-            elif shape is None and value.size not in (4, 5, 8, 12):
+            elif shape is None and pinhole and value.size not in (4, 5, 8, 12):
                 problems.append(f"{name} must have 4, 5, 8 or 12 coefficients, not {value.size}")
             elif not np.isfinite(value).all():
                 problems.append(f"{name} holds a number that is not finite")
@@ -354,11 +359,21 @@ class CameraRectification(MadeAgainByCopies):
             if not is_whole(side) or side < 1:
                 problems.append(f"{name} is {shown(side)}; give pixels, 1 or more")
         raise_if_any(problems)
+        if not pinhole:
+            checked_lens(self.model, self.D)
+
+    def camera_model(self) -> CameraModel:
+        """Return the raw camera with its lens."""
+        intrinsics = (self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2])
+        bent = self.D if self.D.any() or self.model != PINHOLE else self.D[:0]
+        name = _OPENCV_MODELS[bent.size] if self.model == PINHOLE else self.model
+        return CameraModel(name, (*intrinsics, *bent), (self.width, self.height))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, CameraRectification):
             return NotImplemented
-        return (self.width, self.height) == (other.width, other.height) and all(
+        ours = self.model, self.width, self.height
+        return ours == (other.model, other.width, other.height) and all(
             np.array_equal(getattr(self, name), getattr(other, name)) for name in "KDRP"
         )
 
@@ -369,26 +384,23 @@ class CameraRectification(MadeAgainByCopies):
 
 @dataclass(frozen=True)
 class StereoRectification:
-    """Rectification of both cameras of a pair (keys ``LEFT.*`` and ``RIGHT.*``)."""
+    """Rectification of both cameras of a pair (keys ``LEFT.*`` and ``RIGHT.*``).
+
+    Attributes
+    ----------
+    left, right
+        Both cameras.
+    applied
+        Whether images come rectified by it already, as those of a sequence that was opened with
+        these settings do. It is not stored in files and does not count in comparisons.
+    """
 
     left: CameraRectification
     right: CameraRectification
+    applied: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         for side in ("left", "right"):
             camera = getattr(self, side)
             if not isinstance(camera, CameraRectification):
                 raise SettingsError(f"{side} is {shown(camera)}; give CameraRectification(...)")
-
-
-class SettingsGroups(TypedDict):
-    """All groups of one settings file, by the names of the fields of `Settings`.
-
-    The reader gives them and the writer takes them, so that neither needs to know `Settings`.
-    """
-
-    camera: CameraSettings
-    orb: OrbSettings
-    depth: DepthSettings | None
-    rectification: StereoRectification | None
-    viewer: ViewerSettings

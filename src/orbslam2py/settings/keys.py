@@ -182,11 +182,18 @@ RECTIFICATION_KEYS: tuple[str, ...] = tuple(
     for side in ("LEFT", "RIGHT")
     for name in ("K", "D", "R", "P", "width", "height")
 )
+#: Models of the raw cameras of a pair; pinholes if they are missing.
+RECTIFICATION_MODEL_KEYS = ("LEFT.model", "RIGHT.model")
 
 #: Of fisheye lenses, which have other numbers than pinholes.
 FISHEYE_KEYS = tuple(f"Camera.{name}" for name in FISHEYE_PARAMETERS)
 
-_NAMES = (*(key.name for key in KEYS), *FISHEYE_KEYS, *RECTIFICATION_KEYS)
+_NAMES = (
+    *(key.name for key in KEYS),
+    *FISHEYE_KEYS,
+    *RECTIFICATION_KEYS,
+    *RECTIFICATION_MODEL_KEYS,
+)
 
 
 def is_known(name: str) -> bool:

@@ -15,7 +15,7 @@ from orbslam2py.settings.fisheye import (
     PINHOLE,
     TYPES,
     fisheye_model,
-    no_fisheye_pair,
+    needs_right_camera,
 )
 from orbslam2py.settings.foreign import new_line
 from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, parse_number, read_number
@@ -74,20 +74,20 @@ def lens_of_file(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> Fi
         are those of a fisheye lens and it names none; with what to do.
     """
     keys: tuple[str, ...] = _MODEL_KEYS
-    if sensor is Sensor.STEREO:
-        keys += ("Camera2.type", RECTIFIER_MODEL)
-    elif RECTIFIER_MODEL in entries:  # the raw left camera is taken
+    if sensor is not Sensor.STEREO and RECTIFIER_MODEL in entries:  # the raw left camera is taken
         keys = (RECTIFIER_MODEL,)
+    elif sensor is Sensor.STEREO:
+        for key in ("Camera2.type", RECTIFIER_MODEL):  # of the raw cameras
+            if key in entries:
+                _lens_of_entry(entries[key], path, sensor)
     found = [_lens_of_entry(entries[key], path, sensor) for key in keys if key in entries]
     flag = entries.get(_FISHEYE_FLAG)
     if flag is not None and _value(flag) != 0:
         found.append(FileLens("kannala_brandt", flag))
     lens = found[0] if found else FileLens(PINHOLE)
-    if sensor is Sensor.STEREO:
-        for one in found:
-            if one.model != PINHOLE:
-                text = f"{one.named}: {no_fisheye_pair()}:\n    {new_line(sensor)}"
-                _refuse(one.entry, text, path)
+    has_right = "Camera2.fx" in entries
+    if sensor is Sensor.STEREO and lens.model != PINHOLE and not has_right:
+        _refuse(lens.entry, f"{lens.named}: {needs_right_camera()}", path)
     for other in found[1:]:
         if other.model != lens.model:
             text = f"{other.named} contradicts {lens.named}; keep the one that is right"
@@ -95,6 +95,21 @@ def lens_of_file(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> Fi
     if lens.model == PINHOLE:
         _refuse_unnamed_fisheye(entries, lens, path)
     return lens
+
+
+def models_of_pair(entries: Mapping[str, Entry]) -> tuple[str, str]:
+    """Name the models of both cameras of a raw pair; without ``Camera2.type`` they have one."""
+    named = [entries[key] for key in _MODEL_KEYS if key in entries]
+    flag = entries.get(_FISHEYE_FLAG)
+    if not named and flag is not None and _value(flag) != 0:
+        return "kannala_brandt", "kannala_brandt"
+    first = _model_of(named[0]) if named else PINHOLE
+    second = entries.get("Camera2.type")
+    return first, first if second is None else _model_of(second)
+
+
+def _model_of(entry: Entry) -> str:
+    return fisheye_model(entry.value) or PINHOLE
 
 
 def _lens_of_entry(entry: Entry, path: Path, sensor: Sensor) -> FileLens:

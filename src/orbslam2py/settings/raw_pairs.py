@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.fisheye import LENS_PARAMETERS
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, PINHOLE
 from orbslam2py.settings.groups import (
     DISTORTION_FIELDS,
     CameraRectification,
@@ -19,13 +20,16 @@ from orbslam2py.settings.groups import (
     StereoRectification,
 )
 from orbslam2py.settings.opencv_yaml import Entry, Problem, parse_number, read_matrix, read_number
-from orbslam2py.settings.rectify import rectification_of_pair
+from orbslam2py.settings.pair_cameras import cameras_of_pair
+from orbslam2py.settings.right_camera import RightCamera
 
 _INTRINSICS = ("fx", "fy", "cx", "cy")
 #: Numbers that describe one camera, after ``Camera1.`` or ``Camera2.``.
 LENS_NUMBERS = (*_INTRINSICS, *DISTORTION_FIELDS)
 #: Camera 2 to camera 1, in metres.
 RELATIVE_POSE = "Stereo.T_c1_c2"
+#: The same, as ORB-SLAM3 0.x calls it; 3 x 4 numbers.
+OLD_POSE = "Tlr"
 RECTIFIER_KEYS = tuple(
     f"StereoRectifier.{name}_{side}" for side in ("left", "right") for name in "KDR"
 )
@@ -38,28 +42,37 @@ class RawPair:
     Attributes
     ----------
     rectification
-        Of both cameras.
+        Of both cameras; None for a fisheye pair.
     camera
-        fx, fy, cx, cy [pixels] and bf [pixel metres] of the rectified images.
+        fx, fy, cx, cy [pixels] and bf [pixel metres] of the rectified images; of a fisheye pair bf
+        alone.
+    right
+        The right camera of a fisheye pair.
     """
 
-    rectification: StereoRectification
+    rectification: StereoRectification | None
     camera: dict[str, float]
+    right: RightCamera | None = None
 
 
 def rectified_pair(
-    entries: Mapping[str, Entry], second: Mapping[str, Entry], problems: list[Problem]
+    entries: Mapping[str, Entry],
+    second: Mapping[str, Entry],
+    problems: list[Problem],
+    models: tuple[str, str] = (PINHOLE, PINHOLE),
 ) -> RawPair | None:
-    """Find the rectification of a pair with its pose, as ORB-SLAM3 1.0 tells it.
+    """Find how a pair with its pose is used, as ORB-SLAM3 1.0 tells it.
 
     Parameters
     ----------
     entries
         Those of the file by our names: the first camera and the size of the images.
     second
-        ``Camera2.*`` and ``Stereo.T_c1_c2``.
+        ``Camera2.*`` and ``Stereo.T_c1_c2``, or ``Tlr``.
     problems
         Takes what is wrong, except with the first camera, which is read elsewhere.
+    models
+        Of both cameras: "pinhole" or a fisheye model.
 
     Returns
     -------
@@ -67,10 +80,13 @@ def rectified_pair(
         None if something is wrong.
     """
     line = min(entry.line for entry in second.values())
-    wanted = (*(f"Camera2.{name}" for name in _INTRINSICS), RELATIVE_POSE)
+    pose_entry = second.get(RELATIVE_POSE) or second.get(OLD_POSE)
+    lens = LENS_PARAMETERS.get(models[1], ())
+    wanted = [f"Camera2.{name}" for name in (*_INTRINSICS, *lens)]
+    wanted += [] if pose_entry is not None else [RELATIVE_POSE]
     missing = [name for name in wanted if name not in second]
     missing += [name for name in ("Camera.width", "Camera.height") if name not in entries]
-    if missing:
+    if missing or pose_entry is None:
         text = (
             f"{', '.join(missing)} missing: a raw pair needs Camera1.* and Camera2.* with fx, fy, "
             f"cx, cy, Camera.width, Camera.height and {RELATIVE_POSE} (camera 2 to camera 1, in "
@@ -78,44 +94,46 @@ def rectified_pair(
         )
         problems.append(Problem(line, text))
         return None
-    first_camera = _camera(entries, "Camera", [])
-    second_camera = _camera(second, "Camera2", problems)
-    pose = _pose(second[RELATIVE_POSE], problems)
+    first_camera = _camera(entries, "Camera", [], models[0])
+    second_camera = _camera(second, "Camera2", problems, models[1])
+    pose = _pose(pose_entry, problems)
     size = _size(entries)
     if first_camera is None or second_camera is None or pose is None or size is None:
         return None
-    cameras = first_camera, second_camera
-    K = cameras[0].matrix, cameras[1].matrix
-    D = cameras[0].distortion, cameras[1].distortion
-    pose_line = second[RELATIVE_POSE].line
     T_right_left = np.asarray(np.linalg.inv(pose), dtype=np.float64)
     try:
-        rectification = rectification_of_pair(K, D, T_right_left, size)
+        found = cameras_of_pair(first_camera, second_camera, T_right_left, size, pose_entry.key)
     except (SettingsError, cv2.error) as error:
-        text = f"{RELATIVE_POSE} and the two cameras cannot be rectified: {error}"
-        problems.append(Problem(pose_line, text))
+        text = f"{pose_entry.key} and the two cameras make no pair: {error}"
+        problems.append(Problem(pose_entry.line, text))
         return None
-    P, P_right = rectification.left.P, rectification.right.P
+    if found.right is not None:
+        right = replace(found.right, T_left_right=pose)  # with all its digits
+        return RawPair(None, {"bf": found.camera.bf}, right)
+    assert found.rectification is not None
+    P_right = found.rectification.right.P
     bf = -float(P_right[0, 3])
     if bf <= 0 or abs(float(P_right[1, 3])) > 1e-3 * bf:
         text = (
-            f"{RELATIVE_POSE} does not put camera 2 to the right of camera 1 (its translation is "
+            f"{pose_entry.key} does not put camera 2 to the right of camera 1 (its translation is "
             f"{', '.join(f'{value:g}' for value in pose[:3, 3])}); it must map points of camera 2 "
             "into camera 1: take the inverse, if it maps from camera 1 to camera 2"
         )
-        problems.append(Problem(pose_line, text))
+        problems.append(Problem(pose_entry.line, text))
         return None
-    numbers = [P[0, 0], P[1, 1], P[0, 2], P[1, 2]]
-    camera = dict(zip(_INTRINSICS, map(float, numbers), strict=True))
-    return RawPair(rectification, camera | {"bf": bf})
+    numbers = {name: float(getattr(found.camera, name)) for name in _INTRINSICS}
+    return RawPair(found.rectification, numbers | {"bf": bf})
 
 
 def stella_pair(
-    entries: Mapping[str, Entry], given: Mapping[str, Entry], problems: list[Problem]
+    entries: Mapping[str, Entry],
+    given: Mapping[str, Entry],
+    problems: list[Problem],
+    model: str = PINHOLE,
 ) -> RawPair | None:
     """Read the rectification that stella_vslam's ``StereoRectifier`` tells; see `rectified_pair`.
 
-    The first camera is the rectified one there.
+    The first camera is the rectified one there; `model` is that of the raw ones.
     """
     line = min(entry.line for entry in given.values())
     missing = [name for name in RECTIFIER_KEYS if name not in given]
@@ -138,7 +156,13 @@ def stella_pair(
             P = np.column_stack([camera.matrix, [shift, 0.0, 0.0]])
             cameras.append(
                 CameraRectification(
-                    K=_square(K, "K"), D=D, R=_square(R, "R"), P=P, width=size[0], height=size[1]
+                    K=_square(K, "K"),
+                    D=D,
+                    R=_square(R, "R"),
+                    P=P,
+                    width=size[0],
+                    height=size[1],
+                    model=model,
                 )
             )
         except (SettingsError, ValueError) as error:
@@ -180,18 +204,23 @@ def stella_raw_camera(
 
 
 def _camera(
-    entries: Mapping[str, Entry], prefix: str, problems: list[Problem]
+    entries: Mapping[str, Entry], prefix: str, problems: list[Problem], model: str = PINHOLE
 ) -> CameraSettings | None:
     values: dict[str, float] = {}
-    for name in LENS_NUMBERS:
+    lens = LENS_PARAMETERS.get(model)
+    for name in LENS_NUMBERS if lens is None else (*_INTRINSICS, *lens):
         entry = entries.get(f"{prefix}.{name}")
         number = None if entry is None else _read(entry, problems)
         if number is not None:
             values[name] = number
-        elif entry is not None or name in _INTRINSICS:
+        elif entry is not None or lens is not None or name in _INTRINSICS:
             return None
+    fields: dict[str, Any] = dict(values)
+    if lens is not None:
+        fields = {name: values[name] for name in _INTRINSICS}
+        fields |= {"model": model, "lens": tuple(values[name] for name in lens)}
     try:
-        return CameraSettings(**values)  # type: ignore[arg-type]
+        return CameraSettings(**fields)
     except SettingsError as error:
         line = entries[f"{prefix}.fx"].line
         problems.append(Problem(line, str(error).replace("Camera.", f"{prefix}.")))
@@ -218,6 +247,8 @@ def _pose(entry: Entry, problems: list[Problem]) -> FloatArray | None:
     except ValueError as error:
         problems.append(Problem(entry.line, str(error)))
         return None
+    if T.shape == (3, 4):
+        T = np.vstack([T, [0.0, 0.0, 0.0, 1.0]])
     rigid = T.shape == (4, 4) and np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() < 1e-3
     if not rigid or np.linalg.det(T[:3, :3]) < 0 or np.abs(T[3] - (0, 0, 0, 1)).max() > 1e-6:
         text = (

@@ -27,7 +27,6 @@ from orbslam2py.settings.groups import (
     CameraSettings,
     DepthSettings,
     OrbSettings,
-    SettingsGroups,
     StereoRectification,
     ViewerSettings,
     thresholds_swapped,
@@ -42,6 +41,7 @@ from orbslam2py.settings.opencv_yaml import (
     read_number,
     scan,
 )
+from orbslam2py.settings.right_camera import SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.translation import Translated, is_translated, translate
 from orbslam2py.settings.unknown_keys import problem_of_unknown_key, unused_keys
@@ -129,7 +129,8 @@ def groups_of_text(
             f"{new_line(sensor)}"
         )
     notes = _check_names(document, path, allow_unknown=allow_unknown)
-    fisheye = take_lens(document, lens)
+    # The rectified camera of a raw fisheye pair is a pinhole.
+    fisheye = {} if document.rectification is not None else take_lens(document, lens)
     values = _read_values(document, sensor)
     missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
@@ -160,6 +161,7 @@ def groups_of_text(
         depth=DepthSettings(**values["depth"]) if sensor.has_depth else None,
         rectification=rectification,
         viewer=ViewerSettings(**values["viewer"]),
+        right=document.right,
     )
 
 
@@ -293,6 +295,9 @@ def _read_camera_rectification(document: Document, side: str) -> CameraRectifica
             document.problems.append(Problem(entry.line, str(error)))
     if len(values) < 6:
         return None
+    model = document.entries.get(f"{side}.model")
+    if model is not None:
+        values["model"] = str(model.value).lower()
     try:
         return CameraRectification(**values)
     except SettingsError as error:

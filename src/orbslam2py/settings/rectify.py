@@ -6,6 +6,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.groups import CameraRectification, StereoRectification
@@ -65,3 +66,24 @@ def rectification_of_pair(
         for i, (R, P) in enumerate(((R_left, P_left), (R_right, P_right)))
     )
     return StereoRectification(left=left, right=right)
+
+
+def core_rectifier(camera: CameraRectification) -> core.Rectifier:
+    """Make what rectifies the images of one camera of a pair.
+
+    Raises
+    ------
+    SettingsError
+        If the camera cannot see anything of its rectified image.
+    """
+    P = camera.P
+    return core.Rectifier(
+        camera.camera_model().core,
+        np.ascontiguousarray(camera.R),
+        fx=float(P[0, 0]),
+        fy=float(P[1, 1]),
+        cx=float(P[0, 2]),
+        cy=float(P[1, 2]),
+        width=camera.width,
+        height=camera.height,
+    )

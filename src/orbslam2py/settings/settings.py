@@ -20,18 +20,18 @@ from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_file, is_builtin_name
 from orbslam2py.settings.doubts import find_doubts
-from orbslam2py.settings.fisheye import LENS_PARAMETERS, no_fisheye_pair
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, needs_right_camera
 from orbslam2py.settings.groups import (
     DISTORTION_FIELDS,
     CameraSettings,
     DepthSettings,
     OrbSettings,
-    SettingsGroups,
     StereoRectification,
     ViewerSettings,
     raise_if_any,
 )
 from orbslam2py.settings.reader import groups_of_text, read_groups
+from orbslam2py.settings.right_camera import RightCamera, SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
 
@@ -43,8 +43,9 @@ _GROUPS = {
     "depth": DepthSettings,
     "rectification": StereoRectification,
     "viewer": ViewerSettings,
+    "right": RightCamera,
 }
-_MAY_BE_MISSING = ("depth", "rectification")
+_MAY_BE_MISSING = ("depth", "rectification", "right")
 
 
 @dataclass(frozen=True)
@@ -56,14 +57,18 @@ class Settings:
     sensor
         What the settings are for; may be given as text.
     camera, orb
-        The (rectified) camera and the extraction. For one camera `CameraSettings.bf`, which it does
-        not have, becomes 0.
+        The camera (rectified, or the left one of a fisheye pair) and the extraction. For one camera
+        `CameraSettings.bf`, which it does not have, becomes 0; for a fisheye pair it follows from
+        `right`.
     depth
         For stereo and RGB-D; None for one camera, whatever is given.
     rectification
-        How raw stereo pairs are rectified before they are tracked; None if they come rectified.
+        How raw stereo pairs are rectified before they are tracked; None if they come rectified, or
+        are a fisheye pair.
     viewer
         Appearance of the map view.
+    right
+        The right camera of a fisheye pair, whose images are matched as they are; else None.
 
     Raises
     ------
@@ -77,6 +82,7 @@ class Settings:
     depth: DepthSettings | None = None
     rectification: StereoRectification | None = None
     viewer: ViewerSettings = field(default_factory=ViewerSettings)
+    right: RightCamera | None = None
 
     if TYPE_CHECKING:  # text is taken for a sensor, which the type of the field cannot say
 
@@ -88,6 +94,7 @@ class Settings:
             depth: DepthSettings | None = None,
             rectification: StereoRectification | None = None,
             viewer: ViewerSettings = ...,
+            right: RightCamera | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -97,6 +104,7 @@ class Settings:
             if self.camera.bf:
                 object.__setattr__(self, "camera", replace(self.camera, bf=0.0))
             object.__setattr__(self, "depth", None)
+        self._take_baseline()
         problems = []
         if self.sensor.has_depth:
             if not self.camera.bf > 0:
@@ -108,9 +116,24 @@ class Settings:
                     "DepthMapFactor (depth.raw_per_metre) is missing; rgbd needs it: 1000 for "
                     "millimetres, 5000 for TUM, 1 for metres"
                 )
-        if self.sensor is Sensor.STEREO and self.camera.is_fisheye:
-            problems.append(no_fisheye_pair())
+        if self.sensor is Sensor.STEREO and self.camera.is_fisheye and self.right is None:
+            problems = [needs_right_camera()]
         raise_if_any(problems)
+
+    def _take_baseline(self) -> None:
+        """Take bf of a fisheye pair from where its right camera stands."""
+        if self.right is None:
+            return
+        if self.sensor is not Sensor.STEREO:
+            object.__setattr__(self, "right", None)
+            return
+        if self.rectification is not None:
+            raise SettingsError(
+                "rectification and right are both given; a pair is rectified, or has a right "
+                "camera that is matched as it is: keep one"
+            )
+        bf = self.right.baseline * self.camera.pixels_per_radian
+        object.__setattr__(self, "camera", replace(self.camera, bf=bf))
 
     def _check_types(self) -> None:
         for name, kind in _GROUPS.items():
@@ -121,14 +144,14 @@ class Settings:
     @property
     def baseline(self) -> float:
         """Distance of the two cameras of the pair (virtual for RGB-D) [m]; 0 for one camera."""
-        return self.camera.bf / self.camera.fx
+        return self.camera.bf / self.camera.pixels_per_radian
 
     @property
     def close_depth(self) -> float:
         """Depth [m] below which one view is enough for a point; infinite for one camera."""
         if self.depth is None:
             return math.inf
-        return self.camera.bf * self.depth.close_factor / self.camera.fx
+        return self.baseline * self.depth.close_factor
 
     @property
     def max_keyframe_interval(self) -> int:
@@ -211,6 +234,7 @@ class Settings:
             depth=self.depth,
             rectification=self.rectification,
             viewer=self.viewer,
+            right=self.right,
         )
 
     @classmethod
@@ -250,6 +274,11 @@ class Settings:
             lines.append(
                 f"baseline {self.baseline:.4g} m, points are close below {self.close_depth:.4g} m"
             )
+        if self.right is not None:
+            lens = _lens_line(self.right.camera)
+            lines.append(f"fisheye pair, matched without rectification; right camera: {lens}")
+        elif self.rectification is not None and not self.rectification.applied:
+            lines.append("raw pairs are rectified before they are tracked")
         if self.sensor is Sensor.RGBD:
             lines.append(f"depth images: {self.depth_factor:g} units per metre")
         return lines

@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from orbslam2py.settings.fisheye import FISHEYE_PARAMETERS, fisheye_model
+from orbslam2py.settings.fisheye import FISHEYE_PARAMETERS, PINHOLE, fisheye_model
 from orbslam2py.settings.groups import StereoRectification, usual_n_features
-from orbslam2py.settings.lens_model import LENS_KEYS, RECTIFIER_MODEL
+from orbslam2py.settings.lens_model import LENS_KEYS, RECTIFIER_MODEL, models_of_pair
 from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, flat, parse_number
 from orbslam2py.settings.raw_pairs import (
     LENS_NUMBERS,
+    OLD_POSE,
     RECTIFIER_KEYS,
     RELATIVE_POSE,
     RawPair,
@@ -19,6 +20,7 @@ from orbslam2py.settings.raw_pairs import (
     stella_pair,
     stella_raw_camera,
 )
+from orbslam2py.settings.right_camera import RightCamera
 from orbslam2py.settings.sensor import Sensor
 
 #: Other names of our keys, with values of the same meaning and unit.
@@ -50,9 +52,11 @@ _COLOUR_ORDERS = {"gray": "0", "grey": "0", "bgr": "0", "bgra": "0", "rgb": "1",
 _RESIZED = {"Camera.newWidth": "Camera.width", "Camera.newHeight": "Camera.height"}
 _SCALE = "Camera.imageScale"
 #: Of the second camera, which only a pair has.
-_SECOND_CAMERA = (*(f"Camera2.{name}" for name in LENS_NUMBERS), RELATIVE_POSE, *RECTIFIER_KEYS)
-#: Of the second camera of a fisheye pair; not used for one camera, and unknown for stereo.
-_FISHEYE_PAIR = ("Tlr", *(f"Camera2.{name}" for name in FISHEYE_PARAMETERS))
+_SECOND_CAMERA = (
+    *(f"Camera2.{name}" for name in (*LENS_NUMBERS, *FISHEYE_PARAMETERS)),
+    *(RELATIVE_POSE, OLD_POSE),
+    *RECTIFIER_KEYS,
+)
 
 _TAKEN = frozenset(
     {*_RENAMED, *LENS_KEYS, *_RESIZED, *_SECOND_CAMERA} | {_BASELINE, _COLOUR_ORDER, _SCALE}
@@ -67,11 +71,14 @@ class Translated(Document):
     ----------
     rectification
         Of a raw pair that is described as other programs do it.
+    right
+        The right camera of a fisheye pair.
     unreadable
         Our keys whose values could not be found because of a problem that is in the list.
     """
 
     rectification: StereoRectification | None = None
+    right: RightCamera | None = None
     unreadable: set[str] = field(default_factory=set)
 
 
@@ -93,7 +100,7 @@ def translate(document: Document, sensor: Sensor) -> Translated:
     given = flat(document)
     result = Translated(problems=document.problems)
     for name, entry in given.items():
-        if name not in _TAKEN and not (name in _FISHEYE_PAIR and sensor is not Sensor.STEREO):
+        if name not in _TAKEN:
             result.entries[name] = entry
     for name, ours in _RENAMED.items():
         if name in given:
@@ -194,14 +201,19 @@ def _translate_pair(result: Translated, given: Mapping[str, Entry]) -> None:
         _check_rectified(result, second)
         return
     if any(name in RECTIFIER_KEYS for name in second):
-        pair = stella_pair(result.entries, second, result.problems)
+        raw_model = given.get(RECTIFIER_MODEL)
+        model = None if raw_model is None else fisheye_model(raw_model.value)
+        pair = stella_pair(result.entries, second, result.problems, model or PINHOLE)
     else:
-        pair = rectified_pair(result.entries, second, result.problems)
+        pair = rectified_pair(result.entries, second, result.problems, models_of_pair(given))
     if pair is None:
         result.unreadable.add("Camera.bf")
         return
-    result.rectification = pair.rectification
-    for name in LENS_NUMBERS:
+    result.rectification, result.right = pair.rectification, pair.right
+    if pair.right is not None:  # bf follows from where it stands
+        result.entries["Camera.bf"] = Entry("Camera.bf", line, repr(pair.camera["bf"]))
+        return
+    for name in (*LENS_NUMBERS, *FISHEYE_PARAMETERS):
         result.entries.pop(f"Camera.{name}", None)
     for name, value in pair.camera.items():
         result.entries[f"Camera.{name}"] = Entry(f"Camera.{name}", line, repr(value))

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.settings.fisheye import LENS_PARAMETERS, TYPES
-from orbslam2py.settings.groups import DISTORTION_FIELDS, CameraSettings, SettingsGroups
+from orbslam2py.settings.fisheye import LENS_PARAMETERS, PINHOLE, TYPES
+from orbslam2py.settings.groups import DISTORTION_FIELDS, CameraSettings
 from orbslam2py.settings.keys import KEYS, Key
+from orbslam2py.settings.right_camera import RightCamera, SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 
 _TITLES: dict[Literal["camera", "depth", "orb", "viewer"], str] = {
@@ -51,14 +52,32 @@ def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
             lines.append(f"{side}.height: {camera.height}")
             for name in "KDRP":
                 lines += _matrix(f"{side}.{name}", getattr(camera, name))
+            if camera.model != PINHOLE:
+                lines.append(f"{side}.model: {TYPES[camera.model]}")
+    lines += _right_lines(groups["right"])
     return "\n".join(lines) + "\n"
 
 
-def _lens_lines(camera: CameraSettings) -> list[str]:
+def _lens_lines(camera: CameraSettings, key: str = "Camera") -> list[str]:
     """The model of a fisheye lens and its parameters."""
     names = LENS_PARAMETERS[camera.model]
-    lines = [f"Camera.type: {TYPES[camera.model]}"]
-    return lines + [f"Camera.{n}: {value!r}" for n, value in zip(names, camera.lens, strict=True)]
+    lines = [f"{key}.type: {TYPES[camera.model]}"]
+    return lines + [f"{key}.{n}: {value!r}" for n, value in zip(names, camera.lens, strict=True)]
+
+
+def _right_lines(right: RightCamera | None) -> list[str]:
+    """The right camera of a fisheye pair."""
+    if right is None:
+        return []
+    camera = right.camera
+    lines = ["", "# Right camera of a fisheye pair; T_c1_c2 maps its coordinates to the left ones"]
+    if camera.is_fisheye:
+        lines += _lens_lines(camera, "Camera2")
+    else:
+        names = zip(DISTORTION_FIELDS, camera.distortion.tolist(), strict=False)
+        lines += ["Camera2.type: PinHole", *(f"Camera2.{n}: {value!r}" for n, value in names)]
+    lines += [f"Camera2.{n}: {getattr(camera, n)!r}" for n in ("fx", "fy", "cx", "cy")]
+    return lines + _matrix("Stereo.T_c1_c2", right.T_left_right)
 
 
 def _number(key: Key, value: float) -> str:

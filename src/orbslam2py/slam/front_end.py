@@ -19,6 +19,7 @@ from orbslam2py.settings.fit import find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.pair_check import PairCheck
+from orbslam2py.slam.raw_pairs import raw_pairs_of, wide_pair_of
 
 #: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
 #: borders (16 on each side): `features/corner_grid.hpp`.
@@ -58,6 +59,8 @@ class FrontEnd:
         # By the factor on the number of features; more while a single camera starts.
         self._extractors = {1: self._extractor}
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
+        self._raw_pairs = raw_pairs_of(settings, self._extract_pair)
+        self._wide_pair: core.WidePair | None = None
         self._check_calibration = check_calibration
         self._told_depth_size = False
         self.depth_check = DepthCheck(settings.depth_factor)
@@ -66,11 +69,13 @@ class FrontEnd:
     @property
     def depth_warning(self) -> str | None:
         """Why depth will be wrong, as the first images say: its factor, or pairs that are none."""
-        return self.depth_check.warning or self.pair_check.warning
+        raw = None if self._raw_pairs is None else self._raw_pairs.warning
+        return self.depth_check.warning or self.pair_check.warning or raw
 
     def reset(self) -> None:
         """Let the next image have any size: a new map begins."""
         self._context = None
+        self._wide_pair = None
         self._size = None
 
     def monocular(
@@ -110,14 +115,14 @@ class FrontEnd:
         timer: StageTimer,
         mask: PairMask | None = None,
     ) -> core.Frame:
-        """Frame of a rectified pair."""
+        """Frame of a pair: rectified, or raw with settings that tell how it is rectified."""
         assert self._pair_extractor is not None
         self._check(left, "left image")
         self._check(right, "right image")
         if left.shape[:2] != right.shape[:2]:
             raise ImageError(
                 f"left image has size {_size_text(left)}, the right {_size_text(right)}; both must "
-                "be of the size they were rectified to"
+                "be of the size of the calibration"
             )
         if left.shape != right.shape:
             raise ImageError(f"left and right image differ: shapes {left.shape} and {right.shape}")
@@ -132,14 +137,30 @@ class FrontEnd:
         with timer("extract"):
             left_grey = core.to_grey(left, self._settings.camera.rgb)
             right_grey = core.to_grey(right, self._settings.camera.rgb)
+            rectifier = None
+            if self._raw_pairs is not None:
+                left_grey, right_grey = self._raw_pairs.rectify(left_grey, right_grey)
+                left_mask, right_mask = self._raw_pairs.rectify_masks(left_mask, right_mask)
+                rectifier = self._raw_pairs.rectifier
             features_left, features_right = self._pair_extractor.extract(
                 left_grey, right_grey, left_mask, right_mask
             )
         with timer("stereo"):
-            frame = core.build_stereo_frame(
-                context, frame_id, timestamp, features_left, features_right
-            )
-            return self._finished(frame, left, left_grey)
+            if self._wide_pair is not None:
+                frame = core.build_wide_stereo_frame(
+                    context, self._wide_pair, frame_id, timestamp, features_left, features_right
+                )
+            else:
+                frame = core.build_stereo_frame(
+                    context, frame_id, timestamp, features_left, features_right
+                )
+            return self._finished(frame, left, left_grey, rectifier)
+
+    def _extract_pair(
+        self, left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8]
+    ) -> tuple[core.Extraction, core.Extraction]:
+        assert self._pair_extractor is not None
+        return self._pair_extractor.extract(left, right)
 
     def rgbd(
         self,
@@ -192,11 +213,15 @@ class FrontEnd:
         return enlarged_depth(depth, image.shape)
 
     def _finished(
-        self, frame: core.Frame, image: npt.NDArray[np.uint8], grey: npt.NDArray[np.uint8]
+        self,
+        frame: core.Frame,
+        image: npt.NDArray[np.uint8],
+        grey: npt.NDArray[np.uint8],
+        rectifier: core.PairRectifier | None = None,
     ) -> core.Frame:
         core.keep_small_image(frame, grey)
         if image.ndim == 3:
-            core.sample_colours(frame, image, self._settings.camera.rgb)
+            core.sample_colours(frame, image, self._settings.camera.rgb, rectifier)
         return frame
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
@@ -229,6 +254,8 @@ class FrontEnd:
             height, width = image.shape[:2]
             camera = core.Camera(_camera_options(self._settings, width, height))
             self._context = core.FrameContext(camera, self._extractor.scales)
+            if self._settings.right is not None:
+                self._wide_pair = wide_pair_of(self._settings, camera, (width, height))
             self._size = (height, width)
             self._tell_misfit(width, height)
         return self._context
@@ -284,8 +311,10 @@ def _camera_options(settings: Settings, width: int, height: int) -> core.CameraO
     camera = settings.camera
     # A fisheye model replaces the pinhole's numbers.
     lens: dict[str, Any] = {}
-    if camera.is_fisheye:
+    if camera.is_fisheye or settings.right is not None:
         lens["model"] = camera.camera_model(width, height).core
+    if settings.right is not None:
+        lens["right_centre"] = settings.right.centre
     return core.CameraOptions(
         fx=camera.fx,
         fy=camera.fy,

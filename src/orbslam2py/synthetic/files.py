@@ -21,6 +21,7 @@ from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import CameraSettings, ImuSettings, Sensor
 from orbslam2py.synthetic.bag_files import BAG_LAYOUTS, BagContents, write_bag
 from orbslam2py.synthetic.imu import write_euroc_imu, write_imu
+from orbslam2py.synthetic.lens_pair import lens_pair_of
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
@@ -113,6 +114,12 @@ def write_sequence(
     if layout is None and sequence.options.imu and sequence.sensor is not Sensor.RGBD:
         layout = Layout.EUROC
     chosen = choose_layout(layout, sequence.sensor)
+    if sequence.options.lens_pair is not None and layout is None:
+        chosen = Layout.EUROC
+    if sequence.options.lens_pair is not None and chosen is not Layout.EUROC:
+        raise SettingsError(
+            f"the layout {chosen} has no place for the lenses of a raw pair; take the layout euroc"
+        )
     if sequence.options.lens is not None and chosen is not Layout.TUM:
         raise SettingsError(
             f"the layout {chosen} has no place for the lens of the camera; take the layout tum"
@@ -132,6 +139,8 @@ def write_sequence(
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
         if not sequence.options.imu:  # as before there were any
             del about["imu"], about["imu_noise"]
+        if about.pop("lens_pair") is not None:
+            about["lens_pair"] = sequence.default_settings().to_yaml()
         about[_ENTRIES] = {entry.name: _n_files(entry) for entry in sorted(temporary.iterdir())}
         _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
         _check_replaceable(folder, force=force)  # writing takes long: it may have been filled
@@ -236,6 +245,9 @@ def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -
     ]
     for stamp, T, q in zip(stamps, T_wc, quaternions_from_rotations(T_wc[:, :3, :3]), strict=True):
         lines.append(f"{stamp},{_numbers([*T[:3, 3], q[3], *q[:3]], ',')}")
+    if sequence.options.lens_pair is not None:
+        # sensor.yaml does not know all lenses, nor what belongs to the sensor alone.
+        sequence.default_settings().save(folder / "settings.yaml")
     truth = top / "state_groundtruth_estimate0"
     truth.mkdir()
     _write_text(truth / "data.csv", lines)
@@ -267,14 +279,17 @@ def _upright(T_wc: FloatArray) -> FloatArray:
 
 
 def _sensor_yaml(sequence: WritableSequence, number: int) -> list[str]:
-    """Describe a camera; the body frame of the rig is that of its left camera."""
-    camera = sequence.camera
+    """Describe a camera; the body frame of the rig is that of its left camera, as it is tracked."""
+    camera, comment = sequence.camera, "without distortion"
     T_BS = np.eye(4)
     T_BS[0, 3] = sequence.baseline * number
+    if sequence.options.lens_pair is not None:
+        T_BS = lens_pair_of(sequence.options.lens_pair).T_tracked_raw[number]
+        comment = "the lens is in settings.yaml"
     return [
         "%YAML:1.0",
         "sensor_type: camera",
-        "comment: synthetic, without distortion",
+        f"comment: synthetic, {comment}",
         "T_BS:",
         "  cols: 4",
         "  rows: 4",

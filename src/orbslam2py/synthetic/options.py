@@ -9,7 +9,8 @@ from typing import Any
 
 from orbslam2py._arguments import is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import CameraSettings, Sensor, imu_noise
+from orbslam2py.settings import CameraSettings, Sensor, Settings, imu_noise
+from orbslam2py.synthetic.lens_pair import check_lens_pair
 from orbslam2py.synthetic.motions import SyntheticMotion
 from orbslam2py.synthetic.scenes import (
     CORNERED,
@@ -93,6 +94,9 @@ class SyntheticOptions:
     imu_noise
         Name of a chip whose noise the samples have, such as ``bmi088``, with a bias that walks; by
         default they are exact.
+    lens_pair
+        Stereo settings of a raw pair, through whose two lenses the images are seen: with a
+        rectification, or with the right camera of a fisheye pair. The images are raw.
 
     Raises
     ------
@@ -126,6 +130,7 @@ class SyntheticOptions:
     lens: CameraSettings | None = None
     imu: bool = False
     imu_noise: str | None = None
+    lens_pair: Settings | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -174,6 +179,8 @@ class SyntheticOptions:
             )
 
     def _check_lens(self) -> None:
+        if self.lens_pair is not None:
+            self._check_lens_pair(self.lens_pair)
         if self.lens is None:
             return
         if not isinstance(self.lens, CameraSettings):
@@ -190,9 +197,18 @@ class SyntheticOptions:
             raise SettingsError("blur is made for pinhole images alone; leave blur or lens out")
         if self.sensor is Sensor.STEREO:
             raise SettingsError(
-                "a stereo pair is made of pinhole images alone; take the sensor mono or rgbd, or "
-                "leave lens out"
+                "lens is of one camera; give the settings of both as lens_pair, or take the sensor "
+                "mono or rgbd"
             )
+
+    def _check_lens_pair(self, pair: Settings) -> None:
+        if not isinstance(pair, Settings):
+            raise SettingsError(f"lens_pair is {shown(pair)}; give Settings of a raw pair")
+        if self.size is not None or self.lens is not None:
+            raise SettingsError("lens_pair tells size and lens of both cameras; leave them out")
+        if self.blur or self.imu:
+            raise SettingsError("lens_pair goes without blur and imu; leave them out")
+        check_lens_pair(pair, Sensor(self.sensor))
 
     def _check_pieces(self) -> None:
         _check_range("pieces", self.pieces, 1, 1000, whole=True)

@@ -31,6 +31,7 @@ from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sens
 from orbslam2py.synthetic import lens
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.imu import SyntheticImu
+from orbslam2py.synthetic.lens_pair import LensPair, lens_pair_of
 from orbslam2py.synthetic.motions import Motion, SyntheticMotion
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.synthetic.pieces import arrange
@@ -84,6 +85,8 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
     def _size(self) -> tuple[int, int]:
         if (seen_through := self.options.lens) is not None:
             return seen_through.width or 0, seen_through.height or 0
+        if self._lens_pair is not None:
+            return self._lens_pair.models[0].image_size
         return self.options.size or ((1241, 376) if self._scene.outdoors else (640, 480))
 
     def _frames_of_whole_way(self) -> int:
@@ -124,7 +127,9 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
 
     @property
     def camera(self) -> CameraSettings:
-        """The camera; both cameras of a pair are alike."""
+        """The camera; both cameras of a pair are alike, if they are not given."""
+        if self.options.lens_pair is not None:
+            return replace(self.options.lens_pair.camera, fps=self._fps)
         width, height = self._size
         baseline = 0.54 if self._scene.outdoors else 0.1
         if (seen_through := self.options.lens) is not None:
@@ -145,10 +150,12 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
     @property
     def baseline(self) -> float:
         """Distance of the cameras of the pair [m], also the virtual one of RGB-D."""
-        return self.camera.bf / self.camera.fx
+        return self.camera.bf / self.camera.pixels_per_radian
 
     def default_settings(self) -> Settings:
         """Return settings with the exact calibration."""
+        if self.options.lens_pair is not None:
+            return replace(self.options.lens_pair, camera=self.camera)
         depth = None
         if self.sensor.has_depth:
             raw_per_metre = DEPTH_PER_METRE if self.sensor is Sensor.RGBD else None
@@ -167,7 +174,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         return self.default_settings()
 
     def ground_truth(self) -> Trajectory:
-        """Return the exact poses of the (left) camera."""
+        """Return the exact poses of the camera: of a pair the left one, rectified if it will be."""
         T_wc = np.stack([self.T_wc(i) for i in range(len(self))])
         return Trajectory(self.timestamps, T_wc)
 
@@ -269,10 +276,10 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
             As from `load`.
         """
         factor = self._exposure(None) if exposure is None else exposure
-        image, depth = self._render(T_wc, 2 * number, factor)
+        image, depth = self._render(self._left_of(T_wc), 2 * number, factor)
         if self.sensor is Sensor.STEREO:
             T_wr = self._right_of(T_wc)
-            return Images(image, right=self._render(T_wr, 2 * number + 1, factor)[0])
+            return Images(image, right=self._render(T_wr, 2 * number + 1, factor, right=True)[0])
         if self.sensor is Sensor.RGBD:
             return Images(image, depth=self._measured(depth, number))
         return Images(image)
@@ -281,7 +288,8 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         """Depth of the (left) image along z, (height, width) [m]; 0 where nothing is hit."""
         index = index_of(index, len(self))
         seconds = self._seconds_on_way(index)
-        return self._render(self.T_wc(index), 2 * index, 1.0, seconds=seconds)[1]
+        T_wl = self._left_of(self.T_wc(index))
+        return self._render(T_wl, 2 * index, 1.0, seconds=seconds)[1]
 
     def write(
         self,
@@ -333,7 +341,19 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
             return exposure[0]
         return lens.exposure_at(seconds, (exposure[0], exposure[1]), self.options.seed)
 
+    @cached_property
+    def _lens_pair(self) -> LensPair | None:
+        pair = self.options.lens_pair
+        return None if pair is None else lens_pair_of(pair)
+
+    def _left_of(self, T_wc: FloatArray) -> FloatArray:
+        """Pose of the raw left camera, or of the only one."""
+        pair = self._lens_pair
+        return T_wc if pair is None else np.asarray(T_wc @ pair.T_tracked_raw[0])
+
     def _right_of(self, T_wc: FloatArray) -> FloatArray:
+        if self._lens_pair is not None:
+            return np.asarray(T_wc @ self._lens_pair.T_tracked_raw[1])
         T_wr: FloatArray = T_wc.copy()
         T_wr[:3, 3] += self.baseline * T_wc[:3, 0]
         return T_wr
@@ -346,16 +366,17 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         seconds = self._seconds_on_way(index)
         number = 2 * index + right
         exposure = self._exposure(float(self.timestamps[index]))
-        place = self._right_of if right else np.copy
+        place = self._right_of if right else self._left_of
         if options.blur > 0:
             sharp, depth = self._render(place(T_wc), number, 1.0, noise=0.0, seconds=seconds)
             half = 0.5 * options.blur / self._fps
-            pose = self.T_wc_between if options.imu else self._T_wc_at
-            T_open, T_shut = (place(pose(seconds + aside)) for aside in (-half, half))
+            pose_at = self.T_wc_between if options.imu else self._T_wc_at
+            T_open, T_shut = (place(pose_at(seconds + aside)) for aside in (-half, half))
             image = lens.smeared(sharp, depth, self.camera, T_open, place(T_wc), T_shut)
             grey = lens.exposed(image, exposure, options.noise, [options.seed, number])
         else:
-            grey, depth = self._render(place(T_wc), number, exposure, seconds=seconds)
+            pose = place(T_wc)
+            grey, depth = self._render(pose, number, exposure, seconds=seconds, right=right)
         return lens.covered(grey, depth, self._hand_rows(index))
 
     def _render(
@@ -366,11 +387,13 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         *,
         noise: float | None = None,
         seconds: float = 0.0,
+        right: bool = False,
     ) -> tuple[ByteArray, NDArray[np.float32]]:
         noise = self.options.noise if noise is None else noise
-        if self._wide_view is not None:
+        views = self._wide_views
+        if views:
             side = functools.partial(self._side, T_wc, seconds)
-            image, depth = self._wide_view.render(side)
+            image, depth = views[right].render(side)
             return lens.exposed(image, exposure, noise, [self.options.seed, number]), depth
         camera = self.camera
         width, height = self._size
@@ -389,10 +412,13 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         )
 
     @cached_property
-    def _wide_view(self) -> WideView | None:
-        """Renderer of images through a lens; None without a lens."""
+    def _wide_views(self) -> tuple[WideView, ...]:
+        """Renderers of images through the lens, or the lenses of a pair; none without a lens."""
+        if self._lens_pair is not None:
+            left, right = self._lens_pair.models
+            return WideView(left), WideView(right)
         seen_through = self.options.lens
-        return None if seen_through is None else WideView(seen_through.camera_model(*self._size))
+        return () if seen_through is None else (WideView(seen_through.camera_model(*self._size)),)
 
     def _side(
         self, T_wc: FloatArray, seconds: float, R_sc: FloatArray, focal_length: float, size: int

@@ -287,10 +287,10 @@ TEST_P(EachLens, TheRightErrorIsThatOfTheDisparityAsWell) {
   const Eigen::Vector3d p(0.4, -0.2, 3);
   Eigen::Vector2d pixel, error;
   ASSERT_TRUE(camera_->project(p, pixel));
-  const double right_u = camera_->right_column(pixel.x(), 3);
+  const double right_u = pixel.x() - camera_->disparity(p);
   ASSERT_TRUE(camera_->error(p, pixel.x(), pixel.y(), error));
-  EXPECT_NEAR(camera_->right_error(p, error, pixel.x(), right_u), 0, 1e-9);
-  EXPECT_NEAR(camera_->right_error(p, error, pixel.x(), right_u + 2), -2, 1e-9);
+  EXPECT_NEAR(camera_->right_error(p, error, pixel.x(), pixel.y(), right_u), 0, 1e-9);
+  EXPECT_NEAR(camera_->right_error(p, error, pixel.x(), pixel.y(), right_u + 2), -2, 1e-9);
 }
 
 INSTANTIATE_TEST_SUITE_P(Lenses, EachLens, ::testing::ValuesIn(testing::kTestLenses));

@@ -14,11 +14,14 @@ from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import (
     CameraRectification,
     CameraSettings,
+    DepthSettings,
     Sensor,
     Settings,
     StereoRectification,
     settings_for_camera,
 )
+from orbslam2py.settings.defaults import USUAL_CLOSE_FACTOR
+from orbslam2py.settings.pair_cameras import cameras_of_pair
 from orbslam2py.settings.projection import distorted
 
 _FISHEYES = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4")
@@ -132,9 +135,10 @@ class CameraInfo:
         """
         if self.is_fisheye:
             raise DatasetError(
-                f"{self.what}: the distortion model {self.model} is not supported for stereo, nor "
-                "for depth of another camera; use one camera (--sensor mono), record rectified "
-                f"images (image_proc), or {_ADVICE} of undistorted ones"
+                f"{self.what}: the distortion model {self.model} is not supported for "
+                "depth of another camera, nor for a pair without a transform; use one camera "
+                "(--sensor mono), record rectified images (image_proc), or "
+                f"{_ADVICE} of undistorted ones"
             )
         if self.model not in _MODELS:
             raise DatasetError(
@@ -221,6 +225,12 @@ def settings_of_pair(
         return _settings_by_transform(left, right, fps, T_right_left, rectified=rectified)
     if bf < 0:
         raise _exchanged(right.what)
+    if not rectified and (left.is_fisheye or right.is_fisheye):
+        # P and R tell the same as a transform.
+        T = np.eye(4)
+        T[:3, :3] = right.R.T @ left.R
+        T[:3, 3] = right.R.T @ (-bf / left.rectified_K[0, 0], 0.0, 0.0)
+        return _fisheye_settings(left, right, fps, T)
     if np.abs(left.rectified_K - right.rectified_K).max() > 1e-3:
         raise DatasetError(
             f"{left.what} and {right.what} are no rectified pair: their P differ in more than the "
@@ -262,6 +272,8 @@ def _settings_by_transform(
         )
     if at[0] < 0:
         raise _exchanged("the transform between the two cameras", f"that of {right.what}")
+    if not rectified and (left.is_fisheye or right.is_fisheye):
+        return _fisheye_settings(left, right, fps, T)
     K = (left.rectified_K, right.rectified_K) if rectified else (left.K, right.K)
     D = [np.zeros(8) if rectified else info.distortion() for info in (left, right)]
     same_K = np.abs(K[0] - K[1]).max() <= 1e-3
@@ -277,6 +289,26 @@ def _settings_by_transform(
         raise DatasetError(f"{names}: {error}") from error
     P = found.right.P
     return _settings(left, P[:, :3], fps, -float(P[0, 3]), found)
+
+
+def _fisheye_settings(
+    left: CameraInfo, right: CameraInfo, fps: float, T_right_left: FloatArray
+) -> Settings:
+    """Make settings for a raw pair of which one camera at least is a fisheye."""
+    if left.size != right.size:
+        names = f"{left.what} and {right.what}"
+        raise DatasetError(f"{names} are for images of different sizes; {_ADVICE}")
+    raw = [
+        settings_of_camera(one, Sensor.MONOCULAR, fps, rectified=False, depth_factor=None).camera
+        for one in (left, right)
+    ]
+    try:
+        pair = cameras_of_pair(*raw, T_right_left, left.size, "the transform in the bag")
+        usual = settings_for_camera(raw[0], Sensor.MONOCULAR)
+        close = DepthSettings(close_factor=USUAL_CLOSE_FACTOR)
+        return Settings(sensor=Sensor.STEREO, **pair.fields, orb=usual.orb, depth=close)
+    except SettingsError as error:
+        raise DatasetError(f"{left.what} and {right.what}: {error}") from error
 
 
 def _exchanged(by: str, which: str = "that camera") -> DatasetError:

@@ -39,7 +39,7 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.grey_scale import GreyScale, spread_over
 from orbslam2py.datasets.imu import ImuSamples
-from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of, with_rectified_images
 from orbslam2py.datasets.registration import DepthRegistration
 from orbslam2py.errors import DatasetError, ImageError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
@@ -112,7 +112,8 @@ class BagSequence(FramesInOrder):
     @cached_property
     def settings(self) -> Settings:
         """The settings the caller chose, or `default_settings`."""
-        return self.default_settings() if self._chosen is None else self._chosen
+        chosen = self.default_settings() if self._chosen is None else self._chosen
+        return with_rectified_images(chosen)
 
     def default_settings(self) -> Settings:
         """Make settings of the CameraInfo in the bag, or take those that are attached to it.
