@@ -43,7 +43,7 @@ def _refused(done: Outcome, *said: str) -> None:
 def test_nobody_in_the_domain(run_here: CommandLine, domain: int) -> None:
     _refused(
         run_here("run", f"ros2:{domain}", "--sensor", "stereo"),
-        f"ros2:{domain} there are no topics in domain {domain}",
+        f"ros2:{domain}: there are no topics in domain {domain}",
         "start the robot's nodes, or set ROS_DOMAIN_ID",
     )
 
