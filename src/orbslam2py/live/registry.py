@@ -135,6 +135,7 @@ KINDS: tuple[Kind, ...] = (
         "ros2",
         sensors=(Sensor.STEREO, Sensor.RGBD, Sensor.MONOCULAR),
         has_topics=True,
+        can_be_listed=False,
     ),
     Kind(
         "zenoh",
@@ -144,6 +145,7 @@ KINDS: tuple[Kind, ...] = (
         "ros2",
         sensors=(Sensor.STEREO, Sensor.RGBD, Sensor.MONOCULAR),
         has_topics=True,
+        can_be_listed=False,
     ),
 )
 

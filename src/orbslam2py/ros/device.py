@@ -10,7 +10,6 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
-from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from orbslam2py.datasets.base import choose_sensor, rate_of
 from orbslam2py.datasets.registration import DepthRegistration
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.live.device import Request, Sink, Stream
-from orbslam2py.ros.gathering import Gathered, gather
+from orbslam2py.ros.gathering import Gathered, gather, title_of
 from orbslam2py.ros.transport import Subscription, Transport
 from orbslam2py.ros.types import from_cdr
 from orbslam2py.settings import ImuSettings, Sensor, Settings
@@ -75,8 +74,8 @@ class TopicsDevice:
         #: Stamps [ns] by what the sink gets [s], which cannot hold all their digits.
         self._nanoseconds: OrderedDict[float, int] = OrderedDict()
         _log.info(
-            "%s domain %d, on %s",
-            *(self.name, self._transport.domain, self._transport.where),
+            "%s: domain %d, on %s",
+            *(title_of(self.name), self._transport.domain, self._transport.where),
         )
         try:
             named, imu_topic = _named_topics(request.topics)
@@ -86,7 +85,7 @@ class TopicsDevice:
             choice = TopicChoice(self._gathered.bag, named)
             if request.sensor is not None:
                 choice.require(request.sensor)
-            path = Path(self.name)
+            path = self._gathered.bag.path
             self._sensor: Sensor = choose_sensor(path, request.sensor, choice.sensors)
             self._chosen = choice.choose(self._sensor)
             self._imu = _imu_topics(self.name, self._gathered, imu_topic) if imu else {}
@@ -206,9 +205,11 @@ class TopicsDevice:
     def _registration(self) -> DepthRegistration | None:
         frames = (self._heads[0][1], self._heads[1][1])
         camera = find_depth_camera(self._gathered.bag, self._chosen, frames, None)
-        settings, size = self.settings(), self._chosen.left.size
-        if camera is None or settings is None or size is None:
+        size = self._chosen.left.size
+        if camera is None or size is None:
             return None
+        settings = self.settings()
+        assert settings is not None
         return camera.registration(settings, size)
 
     def _subscribe(self, name: str, receive: Callable[[bytes], None]) -> None:
@@ -225,7 +226,9 @@ class TopicsDevice:
             time.sleep(0.1)
         self._transport = None
         transport.close()
-        raise DatasetError(f"{self.name} nobody publishes {' and '.join(sorted(missing))}")
+        raise DatasetError(
+            f"{title_of(self.name)}: nobody publishes {' and '.join(sorted(missing))}"
+        )
 
     # ---- messages --------------------------------------------------------------------------------
     def _on_image(self, stream: Stream, image: ImageTopic, content: bytes) -> None:
@@ -304,11 +307,11 @@ def _imu_topics(name: str, gathered: Gathered, named: str) -> dict[str, Topic]:
         return {"whole": whole[0]}
     if not whole and len(gyros) == len(accels) == 1:
         return {"gyro": gyros[0], "accel": accels[0]}
-    listed = ", ".join(one.name for one in topics)
+    title, listed = title_of(name), ", ".join(one.name for one in topics)
     if not listed:
         raise DatasetError(
-            f"{name} nothing is published as {IMU}; start the node of the IMU, or leave out --imu"
+            f"{title}: nothing is published as {IMU}; start the node of the IMU, or leave out --imu"
         )
     raise DatasetError(
-        f"{name} cannot tell which of {listed} is the IMU; name it: --topics imu={topics[0].name}"
+        f"{title}: cannot tell which of {listed} is the IMU; name it: --topics imu={topics[0].name}"
     )

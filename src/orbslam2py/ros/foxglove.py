@@ -188,6 +188,7 @@ def _served(serving: Serving, context: Context) -> Any:
         if serving.port is not None
         else "give an address of this computer, such as 0.0.0.0 for all, with --foxglove-host"
     )
+    why = str(problem).rpartition(": ")[2].partition(" (os error")[0]  # without its wrapping
     raise DatasetError(
-        f"foxglove: {serving.host}:{ports[0]} cannot be served ({problem}); {remedy}"
+        f"foxglove: {serving.host}:{ports[0]} cannot be served ({why}); {remedy}"
     ) from problem

@@ -32,6 +32,11 @@ _SLICE = 0.05
 _MOST_LISTED = 6
 
 
+def title_of(name: str) -> str:
+    """Name a source at the beginning of a sentence: ``ros2`` for ``ros2:``."""
+    return name.removesuffix(":")
+
+
 class GatheredMessages(Bag):
     """Messages in memory, in the place of a bag.
 
@@ -45,7 +50,7 @@ class GatheredMessages(Bag):
 
     def __init__(self, name: str, contents: Mapping[LiveTopic, list[tuple[int, bytes]]]) -> None:
         # Bag opens files, which there are none of.
-        self.path = Path(name)
+        self.path = Path(title_of(name))
         self.doubts: list[str] = []
         self.layout = "live"
         given = sorted(contents.items())
@@ -110,11 +115,12 @@ def gather(transport: Transport, name: str, named: Mapping[str, str], *, imu: bo
         if is_image or is_other:
             kept[topic] = []
     _receive(transport, kept)
+    title = title_of(name)
     silent = [one for one in wanted.values() if not kept.get(topics[one], [True])]
     if silent or not any(kept[topic] for topic in kept if topic.kind in _IMAGES):
         silent = silent or [topic.name for topic in kept if topic.kind in _IMAGES]
         raise DatasetError(
-            f"{name} nothing is published on {' and '.join(silent)}: no message came in "
+            f"{title}: nothing is published on {' and '.join(silent)}: no message came in "
             f"{MESSAGES:g} s; start the camera's node, or name other topics with --topics"
         )
     heard = {topic: messages for topic, messages in kept.items() if messages}
@@ -143,27 +149,28 @@ def _discover(transport: Transport, name: str, wanted: Mapping[str, str]) -> dic
 def _check(
     transport: Transport, name: str, wanted: Mapping[str, str], topics: Mapping[str, LiveTopic]
 ) -> None:
+    title = title_of(name)
     if not topics:
         raise DatasetError(
-            f"{name} there are no topics in domain {transport.domain} ({transport.where}); start "
+            f"{title}: there are no topics in domain {transport.domain} ({transport.where}); start "
             "the robot's nodes, or set ROS_DOMAIN_ID to the number of their domain"
         )
     for role, one in wanted.items():
         if one not in topics:
             raise DatasetError(
-                f"{name} there is no topic {one} ({role}) in domain {transport.domain}; give "
+                f"{title}: there is no topic {one} ({role}) in domain {transport.domain}; give "
                 f"--topics one of {_listed(topics)}"
             )
         needed = _needed_types(role)
         if topics[one].kind not in needed:
             fitting = {key: topic for key, topic in topics.items() if topic.kind in needed}
             raise DatasetError(
-                f"{name} {one} has the type {topics[one].kind}, but {role} needs "
+                f"{title}: {one} has the type {topics[one].kind}, but {role} needs "
                 f"{' or '.join(needed)}; give --topics one of {_listed(fitting)}"
             )
     if not any(topic.kind in _IMAGES for topic in topics.values()):
         raise DatasetError(
-            f"{name} there are no images in domain {transport.domain}, only {_listed(topics)}; "
+            f"{title}: there are no images in domain {transport.domain}, only {_listed(topics)}; "
             "start the camera's node"
         )
 

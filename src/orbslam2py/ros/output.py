@@ -114,6 +114,7 @@ class RosOutput:
         self._state, self._map_due = "", 0.0
         self._stamp: int = 0
         self._has_begun = False
+        self._map_index: int | None = None
         self._failed: set[str] = set()
         self._queue: queue.Queue[_News | None] = queue.Queue(_ROOM)
         self._out: dict[str, Publication] = {
@@ -189,6 +190,13 @@ class RosOutput:
         if record.state is not TrackingState.OK or record.T_wc is None or step is None:
             self._before = None
             return
+        if self._map_index not in (None, record.map_index):
+            _log.warning(
+                "%s: the camera is in map %d now; poses in the frame %s are relative to its first "
+                "keyframe",
+                *(self._transport.prefix, record.map_index, MAP),
+            )
+        self._map_index = record.map_index
         robot, base = self._base.robot, self._base.name
         T_mb, T_ob = robot.pose(record.T_wc), robot.pose(step.T_oc)
         in_map = Heading(self._stamp, MAP)

@@ -46,6 +46,8 @@ _ATTACHMENT = struct.Struct("<qqB16s")
 #: Messages that wait at most: see `orbslam2py.ros.dds`.
 _DEPTH, _DEPTH_OF = 10, {"sensor_msgs/msg/Imu": 2000}
 _LATCHED_DEPTH = 100
+#: What nodes of Humble write in the place of a hash.
+_NO_HASH = "TypeHashNotSupported"
 _BEST_EFFORT, _TRANSIENT_LOCAL = "2", "1"
 
 
@@ -125,7 +127,8 @@ class ZenohTransport:
     def publish(self, name: str, kind: str, *, latched: bool = False) -> Publication:
         """Publish a topic; see `Transport.publish`."""
         self._require(kind)
-        key = f"{self.domain}{name}/{dds_name(kind)}/{type_hash(kind)}"
+        hashed = self._hash(kind)
+        key = f"{self.domain}{name}/{dds_name(kind)}/{hashed}"
         if latched:
             publisher: Any = ext.declare_advanced_publisher(
                 self._session, key, cache=ext.CacheConfig(max_samples=1), publisher_detection=True
@@ -135,12 +138,13 @@ class ZenohTransport:
                 key, congestion_control=zenoh.CongestionControl.DROP
             )
         quality = _quality(1 if latched else _DEPTH, latched=latched)
-        token = self._announce(_PUBLISHER, name, kind, type_hash(kind), quality)
+        token = self._announce(_PUBLISHER, name, kind, hashed, quality)
         return _Writer(publisher, token)
 
     def serve(self, name: str, kind: str, answer: Answer) -> None:
         """Answer the requests of a service; see `Transport.serve`."""
-        key = f"{self.domain}{name}/{dds_name(kind)}/{type_hash(kind)}"
+        hashed = self._hash(kind)
+        key = f"{self.domain}{name}/{dds_name(kind)}/{hashed}"
         waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
         def run() -> None:
@@ -152,7 +156,7 @@ class ZenohTransport:
         queryable = self._session.declare_queryable(key, waiting.put, complete=True)
         with self._lock:
             self._kept += [queryable, _Ending(waiting)]
-        self._announce(_SERVER, name, kind, type_hash(kind), _quality(_DEPTH))
+        self._announce(_SERVER, name, kind, hashed, _quality(_DEPTH))
 
     def close(self) -> None:
         """End all of it."""
@@ -166,6 +170,12 @@ class ZenohTransport:
                 one.undeclare()
         with contextlib.suppress(Exception):
             self._session.close()
+
+    def _hash(self, kind: str) -> str:
+        """Return the hash of a type as the other nodes write it: those of Humble have none."""
+        if any(topic.key == _NO_HASH for topic in self.topics()):
+            return _NO_HASH
+        return type_hash(kind)
 
     def _require(self, kind: str) -> None:
         if not is_known(kind):

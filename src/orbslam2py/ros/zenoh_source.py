@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from orbslam2py.live.device import FoundDevice, Request
+from orbslam2py.live.device import Request
 from orbslam2py.ros.connect import connect
 from orbslam2py.ros.device import TopicsDevice
 
@@ -15,8 +15,3 @@ _PREFIX = "zenoh"
 def open_device(request: Request) -> TopicsDevice:
     """Connect to the router of a request and choose its topics, without starting."""
     return TopicsDevice(partial(connect, f"{_PREFIX}:{request.address}"), _PREFIX, request)
-
-
-def find_devices() -> list[FoundDevice]:
-    """Return nothing: a network is joined only if somebody asks for it."""
-    return []

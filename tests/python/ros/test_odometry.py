@@ -216,3 +216,17 @@ def test_services_are_offered(published: MemoryNetwork) -> None:
         "/orbslam2py/reset",
         "/orbslam2py/localize",
     }
+
+
+def test_another_map_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    base = BaseFrame("base_link", "left", RobotBase(), "left", None)
+    transport = MemoryTransport(MemoryNetwork())
+    with (
+        new_system(Sensor.STEREO, deterministic=True) as system,
+        RosOutput(transport, system, base, nanoseconds, None),
+    ):
+        play(system, 3)
+        system.reset()
+        track(system, 3)
+    assert "the camera is in map 1 now" in caplog.text
+    assert "/tf_static" not in transport.network.sent

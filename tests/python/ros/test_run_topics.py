@@ -111,7 +111,7 @@ def test_topics_to_a_trajectory_and_back_to_topics(
         listener.close()
     assert done.code == 0, done.err
     first = done.err.splitlines()[0]
-    assert first.startswith(f"Note: {source} domain ")
+    assert first.startswith(f"Note: {source}: domain ")
     assert ("on lo (127.0.0.1)" if source.startswith("ros2") else "no port of its own") in first
     assert Results(Path("out")).report["tracked"] == N
     trajectory = read_tum(Path("out/trajectory_online.txt"))

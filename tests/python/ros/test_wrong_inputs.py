@@ -43,7 +43,7 @@ def _refused(done: Outcome, *said: str) -> None:
 def test_nobody_in_the_domain(run_here: CommandLine, domain: int) -> None:
     _refused(
         run_here("run", f"ros2:{domain}", "--sensor", "stereo"),
-        f"ros2:{domain} there are no topics in domain {domain}",
+        f"ros2:{domain}: there are no topics in domain {domain}",
         "start the robot's nodes, or set ROS_DOMAIN_ID",
     )
 
@@ -59,6 +59,7 @@ def test_nobody_in_the_domain(run_here: CommandLine, domain: int) -> None:
         (("video.mp4", "--base-transform", "1,2,3"), ("--base-transform is for the poses",)),
         (("video.mp4", "--foxglove-port", "9000"), ("--foxglove-port is for Foxglove",)),
         (("video.mp4", "--foxglove-host", "0.0.0.0"), ("give --foxglove as well",)),
+        (("zenoh:robot",), ("no router answers at robot", "zenoh:tcp/192.168.1.5:7447")),
     ],
 )
 def test_what_is_no_source_or_has_no_effect(
@@ -114,11 +115,15 @@ _OTHERS = {"words": "std_msgs/msg/String", "silent": "sensor_msgs/msg/Image"}
     [
         (("ros2:0",), "cyclonedds", "orbslam2py.ros.dds", "ros2"),
         (("zenoh:",), "zenoh", "orbslam2py.ros.zenoh", "ros2"),
+        (("BAG", "--foxglove"), "foxglove", "orbslam2py.ros.foxglove", "foxglove"),
+        (("BAG", "--record", "a.mcap"), "foxglove", "orbslam2py.ros.foxglove", "foxglove"),
+        (("BAG", "--publish", "ros2:"), "cyclonedds", "orbslam2py.ros.dds", "ros2"),
     ],
 )
 def test_a_package_that_is_missing_is_named(
     run_here: CommandLine,
     monkeypatch: pytest.MonkeyPatch,
+    bag: Path,
     arguments: tuple[str, ...],
     package: str,
     module: str,
@@ -132,8 +137,9 @@ def test_a_package_that_is_missing_is_named(
         return real(name, *more)
 
     monkeypatch.setattr(importlib, "import_module", import_module)
+    given = [str(bag) if one == "BAG" else one for one in arguments]
     _refused(
-        run_here("run", *arguments),
+        run_here("run", *given, "--output", "out"),
         f"needs the package {package}, which is not installed",
         f'pip install "orbslam2py[{extra}]"',
     )

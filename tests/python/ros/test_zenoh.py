@@ -114,6 +114,24 @@ def test_nodes_find_and_hear_what_is_published(transport: ZenohTransport, robot:
     kept.undeclare()
 
 
+def test_nodes_of_humble_have_no_hashes(transport: ZenohTransport, robot: Any) -> None:
+    token = TALKER.replace("/2/", "/0/", 1).replace(HASH, "TypeHashNotSupported")
+    kept = robot.liveliness().declare_token(token)
+    _until(transport.topics)
+    heard: list[Any] = []
+    hearing = robot.declare_subscriber("0/orbslam2py/**", heard.append)
+    publication = transport.publish("/orbslam2py/state", STRING)
+    _until(lambda: publication.send(to_cdr(message_class(STRING)("OK"))) or heard)
+    key = "0/orbslam2py/state/std_msgs::msg::dds_::String_/TypeHashNotSupported"
+    assert str(heard[0].key_expr) == key
+    got: list[bytes] = []
+    transport.subscribe(transport.topics()[0], got.append)
+    key = "0/chatter/std_msgs::msg::dds_::String_/TypeHashNotSupported"
+    _until(lambda: robot.put(key, to_cdr(message_class(STRING)("hello"))) or got)
+    kept.undeclare()
+    hearing.undeclare()
+
+
 def test_who_comes_later_gets_what_was_latched(transport: ZenohTransport, router: str) -> None:
     publication = transport.publish("/orbslam2py/state", STRING, latched=True)
     for text in ("old", "new"):
