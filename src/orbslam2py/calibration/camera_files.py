@@ -49,6 +49,7 @@ class CameraFileFormat(str, Enum):
     FCA = "fca"
     WOODSCAPE = "woodscape"
     ARIA = "aria"
+    REALSENSE = "realsense"
     NUMBERS = "numbers"
 
     def __str__(self) -> str:

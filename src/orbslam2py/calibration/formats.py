@@ -12,6 +12,7 @@ from orbslam2py.calibration.readers.fitted import read_aria, read_woodscape
 from orbslam2py.calibration.readers.kalibr import read_kalibr
 from orbslam2py.calibration.readers.kitti import read_kitti
 from orbslam2py.calibration.readers.opencv import read_opencv
+from orbslam2py.calibration.readers.realsense import read_realsense
 from orbslam2py.calibration.readers.ros import read_camera_info, read_ost
 from orbslam2py.calibration.readers.scans import (
     read_nerfstudio,
@@ -53,5 +54,6 @@ READERS: Mapping[str, Reader] = {
     "fca": read_fca,
     "woodscape": read_woodscape,
     "aria": read_aria,
+    "realsense": read_realsense,
     "numbers": read_numbers,
 }

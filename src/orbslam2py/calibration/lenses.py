@@ -18,6 +18,7 @@ _UNSUPPORTED = {
     "thin prism": "a fisheye camera (equidistant with a thin prism)",
     "equirectangular": "a panorama (equirectangular)",
     "polynomial": "a fisheye camera (a polynomial of the angle)",
+    "division": "a camera with the division model of distortion",
 }
 
 #: Names without signs between words, in lower case.
@@ -34,6 +35,7 @@ _NAMES = {
     "thin prism": "thinprismfisheye radtanthinprismfisheye fisheye624",
     "equirectangular": "equirectangular panorama spherical",
     "polynomial": "radialpoly polynomial distortionftheta ftheta",
+    "division": "division simpledivision radialdivision",
 }
 _LENSES = {name: lens for lens, names in _NAMES.items() for name in names.split()}
 
@@ -90,7 +92,6 @@ def _remedy(lens: str) -> str:
         line = f"make settings of the new camera matrix:\n    {new_line(Sensor.MONOCULAR)}"
         return f"cut a pinhole view out of the panorama, and {line}"
     return (
-        "calibrate the camera with a supported fisheye model (Kalibr: pinhole-equi, ds-none, "
-        "eucm-none, omni-radtan or pinhole-fov), or, if it sees less than about 110 degrees, as a "
-        "pinhole camera with orbslam2py calibrate"
+        "calibrate the camera with a supported fisheye model: orbslam2py calibrate chooses one "
+        "(Kalibr: pinhole-equi, ds-none, eucm-none, omni-radtan or pinhole-fov)"
     )

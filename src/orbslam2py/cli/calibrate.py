@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -205,7 +206,7 @@ def _refuse_camchain(camchain: Path | None) -> None:
         raise SettingsError("--camchain goes with two sources or more; leave it out for one camera")
 
 
-def _refuse_single(given: dict[str, object]) -> None:
+def _refuse_single(given: Mapping[str, object]) -> None:
     for option, value in given.items():
         if value is not None:
             raise SettingsError(

@@ -29,7 +29,7 @@ from orbslam2py.errors import OrbSlamError
 from orbslam2py.maps import MapChanges
 from orbslam2py.recordings.growing_map import GrowingMap
 from orbslam2py.recordings.output_file import OutputFile
-from orbslam2py.settings import Settings
+from orbslam2py.settings import CameraModel, Settings
 from orbslam2py.slam.events import (
     Event,
     KeyframeAdded,
@@ -49,6 +49,8 @@ _POINT_PAGE, _KEYFRAME_PAGE = 4096, 64
 #: Seconds of the recording between two states of the map, and of what is as long as the run.
 _MAP_EVERY, _PATHS_EVERY = 0.25, 1.0
 _JPEG_QUALITY = 85
+#: Points of a border of the view of a fisheye lens, and the length of its rays in units of the map.
+_BORDER_POINTS, _LENS_LENGTH = 24, 0.3
 #: Number of images after which the free space is checked again.
 _LOOK = 8
 #: Half width, half height and depth of a camera's shape, relative to its size.
@@ -169,7 +171,11 @@ class RerunRecorder:
         if settings is not None:
             camera = settings.camera
             known = camera.width is not None and camera.height is not None
-            # Rerun has pinholes only: of a fisheye the frustum shows the direction, not the view.
+            if camera.is_fisheye and camera.width is not None and camera.height is not None:
+                # Rerun has pinholes only: the lines show what the fisheye sees.
+                model = camera.camera_model(camera.width, camera.height)
+                lines = rr.LineStrips3D(border_lines(model, _LENS_LENGTH), colors=UNMATCHED)
+                stream.log("world/camera/view", lines, static=True)
             stream.log(
                 "world/camera/image",
                 rr.Pinhole(
@@ -291,6 +297,28 @@ def _layout() -> object:
 def _px(width: float) -> float:
     """A radius in pixels of the screen: negative ones are such."""
     return -width
+
+
+def border_lines(camera: CameraModel, length: float) -> list[FloatArray]:
+    """Lines (n, 3) that bound the view of a camera, in its frame.
+
+    The first goes along the rays at the border of the image, the others from the camera to its
+    corners. Where the lens shows nothing, there is no point.
+    """
+    width, height = camera.image_size
+    u, v = np.linspace(0, width - 1, _BORDER_POINTS), np.linspace(0, height - 1, _BORDER_POINTS)
+    border = np.concatenate(
+        [
+            np.column_stack([u, np.zeros_like(u)]),
+            np.column_stack([np.full_like(v, width - 1), v]),
+            np.column_stack([u[::-1], np.full_like(u, height - 1)]),
+            np.column_stack([np.zeros_like(v), v[::-1]]),
+        ]
+    )
+    rays = length * camera.unproject(border)
+    corners = rays[::_BORDER_POINTS]
+    known = [np.stack([np.zeros(3), one]) for one in corners if np.isfinite(one).all()]
+    return [rays[np.isfinite(rays).all(axis=1)], *known]
 
 
 def _as_jpeg(image: ByteArray) -> bytes:

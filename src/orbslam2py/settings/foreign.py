@@ -318,6 +318,15 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "file",
     ),
     ForeignFormat(
+        "realsense",
+        "a factory calibration of a RealSense camera",
+        "rs-enumerate-devices -c",
+        "The cameras of the resolution that --size chooses: one, or the infrared or fisheye pair.",
+        _line(r'^\s*Intrinsic of\s+"'),
+        'Intrinsic of "Infrared 1" / 848x480 / {Y8}\n  Width: 848\n  PPX: 424.1',
+        "file",
+    ),
+    ForeignFormat(
         "numbers",
         "the numbers of a camera",
         "scripts of one's own, RealSense tools: JSON or YAML",

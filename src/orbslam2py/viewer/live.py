@@ -30,6 +30,7 @@ from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.viewer.actions import ActionsOnSystem
 from orbslam2py.viewer.controls import RunActions
+from orbslam2py.viewer.frusta import vertical_angle
 from orbslam2py.viewer.process import Companion, CompanionError
 from orbslam2py.viewer.process.messages import PathNow, Subject
 from orbslam2py.viewer.publisher import Publisher
@@ -153,8 +154,7 @@ class LiveView:
             self._answers.update(stop=stop)
         camera = system.settings.camera
         subject = Subject(
-            # The height of the image is not told before the first one.
-            fov=float(2 * np.arctan(camera.cy / camera.fy)),
+            fov=vertical_angle(camera),
             with_scale=not system.sensor.has_depth,
             truth=truth,
             can_hold=control is not None,

@@ -149,7 +149,7 @@ REAL = {
     "tumvi512_kalibr_equidistant_camchain.yaml": "kannala_brandt",
     "euroc_models.yaml": "cam0.camera_model is missing",
     "tumvi_imu.yaml": "is no camera file we know",
-    "woodscape_front.json": "a fisheye camera (a polynomial of the angle), which is not supported",
+    "woodscape_front.json": "kannala_brandt",
 }
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import re
 from pathlib import Path
@@ -16,6 +17,7 @@ from orbslam2py.calibration import CameraFileFormat, read_camera_file
 from orbslam2py.calibration.formats import READERS
 from orbslam2py.settings.foreign import FORMATS, recognise_camera_file
 from support import foreign_cameras as files
+from support import lens_files
 from support.camera_files import KALIBR, KITTI, OPENCV, ROS, written
 from support.foreign_cameras import CX, CY, FX, FY, RATIONAL, SIZE, D
 
@@ -48,6 +50,9 @@ OTHERS = {
     "kitti": KITTI,
     "zed": files.zed("HD"),
     "oak": files.OAK,
+    "woodscape": json.dumps(lens_files.WOODSCAPE),
+    "aria": json.dumps(lens_files.ARIA),
+    "realsense": lens_files.REALSENSE,
 }
 
 

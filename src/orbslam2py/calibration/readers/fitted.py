@@ -160,7 +160,7 @@ def read_woodscape(source: CalibrationSource) -> CameraFile:
 
     name = str(source.values.get("name", "the camera"))
     camera, note = fitted_camera(f"{path}: {name}", name, 0, project, size)
-    return CameraFile((camera,), rgb=True, note=note)
+    return CameraFile((camera,), note=note)
 
 
 # ---- Project Aria --------------------------------------------------------------------------------

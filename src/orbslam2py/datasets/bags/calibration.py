@@ -86,7 +86,7 @@ class CameraInfo:
         if not D.any() and model in _NONE_IF_ZERO:
             model = ""
         elif inverse or model == _INVERSE:
-            D, model = _inverted(K, D, size), "plumb_bob"
+            D, model = inverted_distortion(K, D, size), "plumb_bob"
         return cls(what, K, D, rotation, P.reshape(3, 4), model, size)
 
     @property
@@ -354,7 +354,7 @@ def _pinhole(K: FloatArray, size: tuple[int, int]) -> dict[str, Any]:
     }
 
 
-def _inverted(K: FloatArray, D: FloatArray, size: tuple[int, int]) -> FloatArray:
+def inverted_distortion(K: FloatArray, D: FloatArray, size: tuple[int, int]) -> FloatArray:
     """Find k1, k2, p1, p2, k3 that lead to distorted points, for numbers that lead away from them.
 
     The numbers of the RealSense SDK's "Inverse Brown Conrady" make undistorted points of distorted
