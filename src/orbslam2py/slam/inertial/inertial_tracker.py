@@ -166,7 +166,7 @@ class InertialTracker:
             moved = T_cw @ self._T_lw.inverse() @ T_lw
             if last.big_change != self._big_change:
                 self.filter.move(moved)
-            elif self._last_covariance is not None and np.any((T_cw @ moved.inverse()).log()):
+            elif self._last_covariance is not None and _differ(self._T_lw, T_lw):
                 self.filter.update(moved, self._last_covariance)
         self._T_lw = T_lw
         self._big_change = last.big_change
@@ -187,6 +187,10 @@ class InertialTracker:
             The last frame with a pose of its own.
         """
         if estimate.found and self._contradicts(frame, estimate):
+            if _is_strong(estimate):
+                # The image says where it is, as after a loss: the next one has to confirm it.
+                self.forget()
+                return replace(estimate, unconfirmed=True)
             estimate = estimate.failed(Reason.WEAK_EVIDENCE)
         if estimate.found:
             return estimate
@@ -196,11 +200,12 @@ class InertialTracker:
         """Whether a pose with little evidence, or the first one after a gap, is too far off."""
         if self.filter is None or frame.T_cw is None or estimate.covariance is None:
             return False
-        evidence = estimate.evidence
-        strong = evidence is not None and evidence.verdict is Verdict.STRONG
-        if strong and not self._leads:
+        if _is_strong(estimate) and not self._leads:
             return False
-        return self.filter.distance(frame.T_cw, estimate.covariance) > _FAR
+        # The stated covariance of a weak pose holds the difference to the prediction itself.
+        covariance = estimate.covariance if _is_strong(estimate) else np.zeros((6, 6))
+        far = self.filter.distance(frame.T_cw, self._of_image(covariance))
+        return far > _FAR
 
     def tracked(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> None:
         """Take the pose of an image.
@@ -364,6 +369,16 @@ class InertialTracker:
         self._T_lw = state.motion.last.T_cw
         self._big_change = state.motion.last.big_change
         return state
+
+
+def _differ(one: core.Pose, other: core.Pose) -> bool:
+    """Whether two poses are others by more than rounding."""
+    return max(one.difference(other)) > 1e-7
+
+
+def _is_strong(estimate: PoseEstimate) -> bool:
+    evidence = estimate.evidence
+    return evidence is not None and evidence.verdict is Verdict.STRONG
 
 
 def _is_determined(start: core.InertialStart) -> bool:
