@@ -15,6 +15,7 @@ from orbslam2py.datasets.base import (
 from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
 from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.datasets.gopro import read_gopro_imu
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.imu import ImuSamples, imu_of, imu_settings_of
 from orbslam2py.datasets.imu_csv import AccelUnit, GyroUnit, read_imu_csv
@@ -75,6 +76,7 @@ __all__ = [
     "is_recording",
     "open_input",
     "open_sequence",
+    "read_gopro_imu",
     "read_imu_csv",
     "recognise",
 ]

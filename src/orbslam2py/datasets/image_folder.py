@@ -25,11 +25,13 @@ from orbslam2py.datasets.grey_scale import (
     spread_over,
 )
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.imu import ImuSamples
+from orbslam2py.datasets.imu_csv import read_imu_csv
 from orbslam2py.datasets.pair_names import find_series
 from orbslam2py.datasets.time_files import stamps_of_names
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings import Sensor, Settings
+from orbslam2py.settings import ImuSettings, Sensor, Settings, read_imu_settings
 
 _log = logging.getLogger(__name__)
 
@@ -164,6 +166,28 @@ class ImageFolder(FramesInOrder, UnposedSource):
         """Read the image of a frame; see `datasets.base.Sequence.load`."""
         path = self.paths[index_of(index, len(self))]
         return self._delivered(read_image(path, rgb=False, to_8_bits=self._to_8_bits))
+
+    def imu(self) -> ImuSamples | None:
+        """Read the samples of the IMU in ``imu.csv`` of the folder; None if there is none.
+
+        Raises
+        ------
+        DatasetError
+            Naming the line that is wrong.
+        """
+        path = self.folder / "imu.csv"
+        return read_imu_csv(path) if path.is_file() else None
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read ``imu.yaml`` in the folder; None if there is none.
+
+        Raises
+        ------
+        SettingsError
+            Naming the key that is wrong.
+        """
+        path = self.folder / "imu.yaml"
+        return read_imu_settings(path) if path.is_file() else None
 
     def _to_8_bits(self, image: NDArray[np.generic], path: Path) -> ByteArray:
         refuse_depth(path, image, with_depth=False)

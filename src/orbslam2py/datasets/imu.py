@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from orbslam2py.inertial.samples import ImuSamples, joined_streams, make_samples
@@ -59,3 +61,8 @@ def imu_settings_of(sequence: object) -> ImuSettings | None:
     read = getattr(sequence, "imu_settings", None)
     found = read() if callable(read) else None
     return found if isinstance(found, ImuSettings) else None
+
+
+def first_file(paths: Iterable[Path]) -> Path | None:
+    """Return the first of these files that exists."""
+    return next((path for path in paths if path.is_file()), None)

@@ -17,11 +17,14 @@ from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.datasets.gopro import read_gopro_imu
 from orbslam2py.datasets.images import open_video
+from orbslam2py.datasets.imu import ImuSamples, first_file
+from orbslam2py.datasets.imu_csv import read_imu_csv
 from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings import Sensor, Settings
+from orbslam2py.settings import ImuSettings, Sensor, Settings, read_imu_settings
 
 _log = logging.getLogger(__name__)
 
@@ -251,6 +254,34 @@ class VideoSequence(FramesInOrder, UnposedSource):
     def load(self, index: int, /) -> Images:
         """Decode a frame; see `datasets.base.Sequence.load`. Fast only in order."""
         return self._delivered(self._reader.read(index_of(index, len(self))))
+
+    def imu(self) -> ImuSamples | None:
+        """Read the samples of the IMU: those of a GoPro video, or of a table beside the video.
+
+        The table is ``VIDEO.imu.csv`` or ``imu.csv``; see `read_imu_csv`. Its times must be on the
+        clock of `timestamps`.
+
+        Raises
+        ------
+        DatasetError
+            If there are samples that cannot be read.
+        """
+        table = first_file(self._beside("csv"))
+        return read_gopro_imu(self.path) if table is None else read_imu_csv(table)
+
+    def imu_settings(self) -> ImuSettings | None:
+        """Read ``VIDEO.imu.yaml`` or ``imu.yaml`` beside the video; None if there are none.
+
+        Raises
+        ------
+        SettingsError
+            If they are wrong.
+        """
+        path = first_file(self._beside("yaml"))
+        return None if path is None else read_imu_settings(path)
+
+    def _beside(self, suffix: str) -> tuple[Path, Path]:
+        return self.path.with_suffix(f".imu.{suffix}"), self.path.parent / f"imu.{suffix}"
 
     def _own_stamps(self, seconds: FloatArray) -> Stamps:
         if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():

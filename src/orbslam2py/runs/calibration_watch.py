@@ -259,7 +259,8 @@ def check_calibration(
     watch = CalibrationWatch(
         own, own.sensor, known=settings_beside(images_of), thresholds=thresholds
     )
-    for _, images in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
+    for one in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
+        images = one.images
         watch.look(Images(images.image, images.right, images.depth, images.mask))
     return watch.finish()
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import Any
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.imu import ImuSamples, imu_of, imu_settings_of
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings.imu import ImuSettings
+from orbslam2py.slam.inertial import ImuCheck
 
 _log = logging.getLogger(__name__)
 
@@ -102,3 +104,24 @@ def find_imu(
         _log.warning("the IMU is not used: %s", error)
         return None
     return ImuOfRun(settings, samples)
+
+
+def imu_entry(check: ImuCheck, n_samples: int) -> dict[str, Any]:
+    """Say for ``report.json`` whether the IMU fits the camera, and what was measured of it.
+
+    Time offset in seconds, rotation from IMU to camera (3, 3), bias of the gyro in rad/s, gravity
+    in m/s^2; None where the motion did not tell them.
+    """
+    report = check.report
+    rates = None if report is None else report.rates
+    gravity = None if report is None else report.gravity
+    return {
+        "samples": n_samples,
+        "verdict": str(check.verdict),
+        "faults": [{"kind": fault.kind, "text": fault.text} for fault in check.faults],
+        "time_offset": None if rates is None else rates.offset,
+        "time_offset_deviation": None if rates is None else rates.offset_deviation,
+        "rotation": None if rates is None else rates.R.tolist(),
+        "gyro_bias": None if rates is None else rates.bias.tolist(),
+        "gravity": None if gravity is None else gravity.magnitude,
+    }

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -105,6 +106,8 @@ class RunResult:
     """The one of the finished map, if it was asked for; the last of these."""
     median_depth: float | None = None
     """Of the first depth images [m]; None without depth."""
+    imu: dict[str, Any] | None = None
+    """What is known of the IMU, as in ``report.json``; None without one."""
     warnings: list[str] = field(default_factory=list)
     """What the result suffers from: a calibration that does not fit, a loss until the end."""
     calibration_warnings: list[str] = field(default_factory=list)

@@ -24,7 +24,7 @@ from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
-from orbslam2py.runs.imu import find_imu
+from orbslam2py.runs.imu import find_imu, imu_entry
 from orbslam2py.runs.kept_images import KeptImages
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
@@ -173,6 +173,9 @@ class SequenceRunner:
         result.warnings += getattr(result.sequence, "doubts", ())  # logged when it was opened
         result.warnings += system.settings.doubts()  # which the system has logged
         self._judge_depth(system)
+        if system.imu_check is not None:
+            result.imu = imu_entry(system.imu_check, system.pipeline.inertial.n_samples)
+            result.warnings += [fault.text for fault in system.imu_check.faults]
         result.calibration_warnings = self._calibration_warnings(system)
         result.warnings += result.calibration_warnings
         self._collect(system)

@@ -48,6 +48,7 @@ from orbslam2py.slam.events import Callbacks, LoopClosed, MapsMerged
 from orbslam2py.slam.frame_source import FrameSource, SomeImages, arrays_of, timed_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
+from orbslam2py.slam.inertial import ImuCheck
 from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pipeline import Pipeline
 from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
@@ -593,6 +594,14 @@ class System:
     def map_contents(self) -> MapContents:
         """Everything that the map is, as arrays; may be called while the system runs."""
         return take_contents(self.pipeline.back_end.map)
+
+    @property
+    def imu_check(self) -> ImuCheck | None:
+        """Whether the IMU fits the camera, as far as is known; None without IMU settings.
+
+        `ImuCheck.verdict` is unknown at first; `ImuCheck.reason` says why its use is held back.
+        """
+        return self.pipeline.inertial.check
 
     # ---- results ---------------------------------------------------------------------------------
     @property

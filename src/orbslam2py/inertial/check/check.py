@@ -11,6 +11,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.inertial.check import streams
 from orbslam2py.inertial.check.gravity import GravityFit, fit_gravity
 from orbslam2py.inertial.check.rates import (
+    CameraRates,
     MeanGyro,
     RateFit,
     axes_text,
@@ -33,6 +34,8 @@ _TURNING = 0.08
 _EXPLAINED = 0.8
 #: Time offset [s] and angle [rad] that do no harm.
 _SMALL_OFFSET, _SMALL_ANGLE = 5e-3, 3 * _DEGREE
+#: Standard deviation of the time offset [s], from which on longer intervals [s] are compared, too.
+_SLOW, _LONG = 1.5e-3, 0.2
 #: Relative error of a scale, or of gravity, that may be one of the path.
 _SMALL_SCALE = 0.1
 #: Usual length of the specific force [m/s^2], beyond which its unit is wrong.
@@ -85,7 +88,7 @@ def check_imu(
             f"{t[0] - camera.begin[0]:.3f} s",
         )
         return report
-    rates = fit_rates(camera, MeanGyro(t, gyro), believed, reach, _STEPS)
+    rates = _fitted(camera, paths, MeanGyro(t, gyro), believed, reach)
     if rates is None:
         report.open_questions.append(
             f"fewer than {_STEPS} steps of the camera lie inside the samples; record a longer piece"
@@ -102,6 +105,23 @@ def check_imu(
     if T_ci is not None:
         _check_gravity(report, t, accel, _longest(paths), T_ci, offset, settings)
     return report
+
+
+def _fitted(
+    camera: CameraRates,
+    paths: Sequence[Trajectory],
+    gyro: MeanGyro,
+    believed: float,
+    reach: float,
+) -> RateFit | None:
+    """Compare from pose to pose, and for slow motion over longer intervals, if that tells more."""
+    rates = fit_rates(camera, gyro, believed, reach, _STEPS)
+    if rates is None or rates.offset_deviation < _SLOW:
+        return rates
+    longer = fit_rates(camera_rates(paths, _LONG), gyro, believed, reach, _STEPS)
+    if longer is None or longer.offset_deviation > rates.offset_deviation:
+        return rates
+    return longer
 
 
 # ---- the samples alone ---------------------------------------------------------------------------
@@ -142,6 +162,7 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
                     "saturated",
                     f"axis {axis} of the {name} is saturated at {top:.4g} in {n} samples; choose "
                     "a larger range of the IMU, or move more gently",
+                    n / len(values),
                 )
     unit = streams.accel_unit(accel)
     length = float(np.median(np.linalg.norm(accel, axis=1)))
@@ -149,7 +170,7 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
         report.blame(
             "g",
             f"the accelerometer reads {length:.3g} where gravity is 9.81 m/s^2: it is in g; "
-            "multiply by 9.81, or give the table with --imu and --accel-unit g",
+            "multiply by 9.81, or give the table with --imu-samples and --accel-unit g",
         )
         return gyro, accel * streams.GRAVITY
     low, high = _ODD_FORCE
@@ -215,10 +236,10 @@ def _check_scale(report: ImuReport, rates: RateFit) -> None:
         report.blame(
             "degrees",
             f"the gyro reads {1 / factor:.1f} times the camera's rotation rate: it is in degrees "
-            "per second; multiply by 0.0174533, or give the table with --imu and "
+            "per second; multiply by 0.0174533, or give the table with --imu-samples and "
             "--gyro-unit deg/s",
         )
-    elif abs(factor - 1) > _SMALL_SCALE:
+    elif abs(factor - 1) > max(_SMALL_SCALE, 4 * rates.scale_deviation):
         report.blame(
             "scale",
             f"the gyro reads {1 / factor:.3g} times the camera's rotation rate; correct its unit "
@@ -297,6 +318,13 @@ def _other_axes(
             f"rotation from IMU to camera: {_matrix_text(rates.R)}",
         )
         return turned
+    if rates.R_deviation > 5 * _DEGREE:
+        report.blame(
+            "rotation",
+            "the gyro does not turn as the camera with the rotation of the settings; turn about "
+            "all axes, so that the right one can be told",
+        )
+        return None
     report.blame(
         "rotation",
         f"the rotation between camera and IMU in the settings is {angle / _DEGREE:.0f} degrees "
@@ -308,7 +336,7 @@ def _other_axes(
 def _worse(rates: RateFit, M: FloatArray, best: FloatArray) -> bool:
     """Whether a matrix fits clearly worse than the best one."""
     a, b = rates.misfit(M), max(rates.misfit(best), 1e-10)
-    return a > 1.5 * b and (a - b) / b * rates.camera.size > 30
+    return a > 1.25 * b and (a - b) / b * rates.n > 30
 
 
 def _matrix_text(R: FloatArray) -> str:

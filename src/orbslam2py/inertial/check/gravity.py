@@ -44,6 +44,8 @@ class GravityFit:
     best_axes, best_misfit
         The exchange of axes (3, 3) that fits best: readings in the frame of the IMU are
         ``best_axes @ reading``; and what is left with it [m].
+    negated_misfit
+        What is left with all readings negated [m].
     up
         Force without the bias in the world, (n, 3), m/s^2, for a plot, at the times `t`.
     t
@@ -57,6 +59,7 @@ class GravityFit:
     misfit: float
     best_axes: FloatArray
     best_misfit: float
+    negated_misfit: float
     up: FloatArray
     t: FloatArray
 
@@ -123,9 +126,14 @@ def fit_gravity(
         misfit=float(misfit[0]),
         best_axes=all_axes[best],
         best_misfit=float(misfit[best]),
+        negated_misfit=float(misfit[_negated(all_axes)]),
         up=np.einsum("nki,ni->nk", R_wb, accel - x[3:6]),
         t=t,
     )
+
+
+def _negated(all_axes: list[FloatArray]) -> int:
+    return next(k for k, P in enumerate(all_axes) if np.array_equal(P, -np.eye(3)))
 
 
 def _design(at: FloatArray, p: FloatArray, biased: FloatArray) -> tuple[FloatArray, int]:
@@ -148,7 +156,8 @@ def _design(at: FloatArray, p: FloatArray, biased: FloatArray) -> tuple[FloatArr
 
 def _solve(A: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solutions, one a column, and the sum of squares that each leaves."""
-    x = np.asarray(np.linalg.lstsq(A, y, rcond=None)[0], np.float64)
+    Q, R = np.linalg.qr(A)  # much smaller for what follows
+    x = np.asarray(np.linalg.lstsq(R, Q.T @ y, rcond=None)[0], np.float64)
     return x, np.asarray(((A @ x - y) ** 2).sum(axis=0))
 
 

@@ -18,6 +18,9 @@ from orbslam2py.trajectory import Trajectory
 _LONGEST_STEP = 0.3
 #: Steps of the coarse and of the fine search for the time offset [s]; the best is refined.
 _COARSE, _STEP = 1e-2, 2e-3
+#: Standard deviations from the expected time offset, from which on another one must fit clearly
+#: better: by this share of the variance, and by this sum of squares in units of the variance.
+_DEVIATIONS, _GAIN, _CERTAIN = 4.0, 0.3, 30.0
 
 
 @dataclass(frozen=True)
@@ -30,28 +33,46 @@ class CameraRates:
         Seconds on the clock of the camera, (n,).
     rates
         In the frame of the camera [rad/s], (n, 3).
+    overlap
+        Number of intervals that share each moment.
     """
 
     begin: FloatArray
     end: FloatArray
     rates: FloatArray
+    overlap: float = 1.0
 
     def __len__(self) -> int:
         return len(self.begin)
 
 
-def camera_rates(paths: Iterable[Trajectory]) -> CameraRates:
-    """Rotation rates of paths; each lies in a world of its own."""
+def camera_rates(paths: Iterable[Trajectory], span: float = 0.0) -> CameraRates:
+    """Rotation rates of paths; each lies in a world of its own.
+
+    Parameters
+    ----------
+    paths
+        Poses of the camera.
+    span
+        Least length of an interval [s], within poses that follow each other.
+    """
     rows: list[FloatArray] = []
+    lengths: list[int] = []
     for path in paths:
         t, T, good = path.timestamps, path.T_wc, ~path.lost
-        for i in np.flatnonzero(good[:-1] & good[1:]):
-            step = t[i + 1] - t[i]
-            if 0 < step <= _LONGEST_STEP:
-                turn = cv2.Rodrigues(T[i, :3, :3].T @ T[i + 1, :3, :3])[0].ravel()
-                rows.append(np.array([t[i], t[i + 1], *(turn / step)]))
+        # Pieces without a gap; in each, the first pose that is far enough ends the interval.
+        apart = ~(good[:-1] & good[1:]) | (np.diff(t) > _LONGEST_STEP) | (np.diff(t) <= 0)
+        piece = np.concatenate([[0], np.cumsum(apart)])
+        ends = np.searchsorted(t, t + span - 1e-6, side="left") if span else np.arange(len(t)) + 1
+        for i, j in enumerate(ends.tolist()):
+            if i < j < len(t) and piece[i] == piece[j]:
+                step = t[j] - t[i]
+                turn = cv2.Rodrigues(T[i, :3, :3].T @ T[j, :3, :3])[0].ravel()
+                rows.append(np.array([t[i], t[j], *(turn / step)]))
+                lengths.append(j - i)
     table = np.array(rows).reshape(-1, 5)
-    return CameraRates(table[:, 0], table[:, 1], table[:, 2:])
+    overlap = float(np.mean(lengths)) if lengths else 1.0
+    return CameraRates(table[:, 0], table[:, 1], table[:, 2:], overlap)
 
 
 class MeanGyro:
@@ -84,7 +105,7 @@ class RateFit:
         The orthogonal matrix (3, 3), also a reflection, that fits best.
     R
         The rotation (3, 3) that fits best.
-    scale
+    scale, scale_deviation
         Of the camera's rate to that of the gyro.
     explained
         Share of the camera's rotation that `M` explains, 0 to 1.
@@ -100,6 +121,8 @@ class RateFit:
         The rates that were compared, (n, 3).
     at
         Middle of each interval on the clock of the camera [s].
+    overlap
+        Number of intervals that share each moment.
     """
 
     offset: float
@@ -107,6 +130,7 @@ class RateFit:
     M: FloatArray
     R: FloatArray
     scale: float
+    scale_deviation: float
     explained: float
     bias: FloatArray
     deviation: float
@@ -116,6 +140,12 @@ class RateFit:
     camera: FloatArray
     gyro: FloatArray
     at: FloatArray
+    overlap: float = 1.0
+
+    @property
+    def n(self) -> float:
+        """Number of independent components of rates that were compared."""
+        return self.camera.size / self.overlap
 
     def misfit(self, M: FloatArray) -> float:
         """Mean square of what is left [(rad/s)^2] with another matrix (3, 3) and the best scale."""
@@ -146,7 +176,7 @@ def fit_rates(
     kept = np.ones(len(camera), dtype=bool)
 
     def shares_at(offsets: FloatArray) -> FloatArray:
-        return np.array([_share(camera, gyro, offset, kept, least) for offset in offsets])
+        return _shares(camera, gyro, offsets, kept, least)
 
     coarse = around + np.arange(-reach, reach + _COARSE / 2, _COARSE)
     shares = shares_at(coarse)
@@ -168,7 +198,17 @@ def fit_rates(
         left = np.linalg.norm(c - scale * g @ M.T, axis=1)
         kept = kept.copy()
         kept[np.flatnonzero(use)[left > 5 * max(float(np.median(left)), 1e-6)]] = False
-    return _finished(camera, gyro, best, kept)
+    found = _finished(camera, gyro, best, kept)
+    if abs(best - around) < _DEVIATIONS * found.offset_deviation:
+        return found
+    # Slow motion fits nearly as well at another time: then the expected offset stands.
+    _, inside = gyro.over(camera.begin + around, camera.end + around)
+    if (kept & inside).sum() < least:
+        return found
+    expected = _finished(camera, gyro, around, kept)
+    gain = expected.deviation**2 / max(found.deviation**2, 1e-12) - 1
+    is_better = gain > _GAIN and gain * found.n > _CERTAIN
+    return found if is_better else expected
 
 
 def _finished(
@@ -185,38 +225,55 @@ def _finished(
     turning = scale * g
     information = (turning**2).sum() * np.eye(3) - turning.T @ turning
     weakest = max(float(np.linalg.eigvalsh(information)[0]), 1e-12)
+    # Overlapping intervals are not independent.
+    certain = deviation * float(np.sqrt(camera.overlap))
     step = 1e-3
     late = gyro.over(camera.begin + offset + step, camera.end + offset + step)[0][use]
     slope = scale * (late - w_g) / step
     return RateFit(
         offset=float(offset),
-        offset_deviation=deviation / float(np.sqrt(max((slope**2).sum(), 1e-12))),
+        offset_deviation=certain / float(np.sqrt(max((slope**2).sum(), 1e-12))),
         M=M,
         R=R,
         scale=scale,
+        scale_deviation=certain / float(np.sqrt(max((g**2).sum(), 1e-12))),
         explained=max(0.0, 1.0 - float((left**2).sum() / max((c**2).sum(), 1e-12))),
         bias=w_g.mean(axis=0) - R.T @ w_c.mean(axis=0) / max(scale, 1e-9),
         deviation=deviation,
-        R_deviation=deviation / float(np.sqrt(weakest)),
+        R_deviation=certain / float(np.sqrt(weakest)),
         camera_rms=float(np.sqrt((c**2).sum() / len(c))),
         gyro_rms=float(np.sqrt((g**2).sum() / len(g))),
         camera=w_c,
         gyro=w_g,
         at=0.5 * (camera.begin + camera.end)[use],
+        overlap=camera.overlap,
     )
 
 
-def _share(
-    camera: CameraRates, gyro: MeanGyro, offset: float, kept: NDArray[np.bool_], least: int
-) -> float:
-    """Share of the camera's rotation that the best orthogonal matrix explains."""
-    means, inside = gyro.over(camera.begin + offset, camera.end + offset)
-    use = kept & inside
-    if use.sum() < least:
-        return float("nan")
-    c, g = _centred(camera.rates[use]), _centred(means[use])
-    trace = float(np.linalg.svd(c.T @ g, compute_uv=False).sum())
-    return trace**2 / max(float((c**2).sum() * (g**2).sum()), 1e-18)
+def _shares(
+    camera: CameraRates,
+    gyro: MeanGyro,
+    offsets: FloatArray,
+    kept: NDArray[np.bool_],
+    least: int,
+) -> FloatArray:
+    """Share of the camera's rotation that the best orthogonal matrix explains, by offset (m,)."""
+    shape = (len(offsets), len(camera))
+    begin, end = ((at[None] + offsets[:, None]).ravel() for at in (camera.begin, camera.end))
+    means, inside = gyro.over(begin, end)
+    use = (inside.reshape(shape) & kept).astype(float)[..., None]
+    n = use.sum(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        g = means.reshape(*shape, 3)
+        g = (g - (g * use).sum(axis=1, keepdims=True) / n) * use
+        c = (camera.rates - (camera.rates * use).sum(axis=1, keepdims=True) / n) * use
+    enough = n[:, 0, 0] >= least
+    g, c = g[enough], c[enough]
+    shares = np.full(len(offsets), np.nan)
+    trace = np.linalg.svd(c.transpose(0, 2, 1) @ g, compute_uv=False).sum(axis=1)
+    sizes = (c**2).sum(axis=(1, 2)) * (g**2).sum(axis=(1, 2))
+    shares[enough] = trace**2 / np.maximum(sizes, 1e-18)
+    return shares
 
 
 def _peak(offsets: FloatArray, shares: FloatArray) -> float:

@@ -20,10 +20,13 @@ class Finding:
         ``scale``, ``swapped``, ``dead``, ``saturated``, ``sign`` or ``unrelated``.
     text
         What is wrong and the likely remedy.
+    share
+        Share of the samples that show it, 0 to 1.
     """
 
     kind: str
     text: str
+    share: float = 1.0
 
 
 @dataclass
@@ -55,6 +58,6 @@ class ImuReport:
         """Whether no fault was found."""
         return not self.faults
 
-    def blame(self, kind: str, text: str) -> None:
+    def blame(self, kind: str, text: str, share: float = 1.0) -> None:
         """Add a fault."""
-        self.faults.append(Finding(kind, text))
+        self.faults.append(Finding(kind, text, share))

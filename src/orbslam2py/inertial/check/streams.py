@@ -22,11 +22,16 @@ _STEEP = 3e-3
 def swapped(gyro: FloatArray, accel: FloatArray) -> bool:
     """Whether the readings (n, 3) of the gyro are those of the accelerometer and the reverse."""
     low, high = _NEAR_GRAVITY
-    lengths = [np.linalg.norm(one, axis=1) for one in (gyro, accel)]
-    g, a = (float(np.median(one)) for one in lengths)
-    steady = float(lengths[1].std()) / max(a, 1e-9) < float(lengths[0].std()) / max(g, 1e-9)
+    g, a = (float(np.median(np.linalg.norm(one, axis=1))) for one in (gyro, accel))
+    steady = _steadiness(accel) > _steadiness(gyro)
     # Beside a gyro that turns with 10 degrees/s, gravity of 1 g is there, steadier than the gyro.
     return low < g < high and a < 5 and not (0.7 < a < 1.3 and steady)
+
+
+def _steadiness(readings: FloatArray) -> float:
+    """Length of the mean of readings (n, 3) by their usual length, 0 to 1."""
+    usual = float(np.sqrt((readings**2).sum(axis=1).mean()))
+    return float(np.linalg.norm(readings.mean(axis=0))) / max(usual, 1e-9)
 
 
 def dead_axes(readings: FloatArray) -> list[str]:

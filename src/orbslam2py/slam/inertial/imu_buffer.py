@@ -68,6 +68,11 @@ class ImuBuffer:
     ----------
     time_offset
         Seconds to add to the time of an image for the time on the clock of the IMU.
+
+    Attributes
+    ----------
+    n_samples
+        Samples that came so far, also those that were left out.
     """
 
     def __init__(self, time_offset: float = 0.0) -> None:
@@ -81,7 +86,7 @@ class ImuBuffer:
         self._in_time = True
         self._before: float | None = None
         self._image_at_last_sample: float | None = None
-        self._any = False
+        self.n_samples = 0
         self._told: set[str] = set()
 
     @property
@@ -109,13 +114,13 @@ class ImuBuffer:
             return
         cleaned = clean_rows(rows)
         with self._changed:
+            self.n_samples += len(rows)
             self._tell(cleaned.n_not_finite, "samples of the IMU are not finite; they are left out")
             self._tell(cleaned.n_unsorted, _UNSORTED)
             self._tell(cleaned.n_repeated, _REPEATED)
             if len(cleaned.rows):
                 self._new.append(cleaned.rows.copy())
                 self._newest = max(self._newest, float(cleaned.rows[-1, 0]))
-                self._any = True
                 if len(cleaned.rows) > 1:
                     self._step = min(MAX_GAP, float(np.median(np.diff(cleaned.rows[:, 0]))))
             self._changed.notify_all()
@@ -243,7 +248,7 @@ class ImuBuffer:
     def _judge(self, interval: ImuInterval | None, timestamp: float) -> None:
         """Warn of missing samples."""
         rows, at = self._rows, timestamp + self.time_offset
-        if not self._any:
+        if self._newest == -np.inf:
             assert self._image_at_last_sample is not None
             self._tell(
                 timestamp - self._image_at_last_sample > _PATIENCE,

@@ -18,7 +18,14 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.slam.inertial.imu_buffer import ImuInterval
 from orbslam2py.slam.inertial.inertial_views import InertialViews
-from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason, TrackingState, Verdict
+from orbslam2py.slam.records import (
+    InertialState,
+    PoseEstimate,
+    PoseMethod,
+    Reason,
+    TrackingState,
+    Verdict,
+)
 from orbslam2py.slam.state import Motion, State
 
 _log = logging.getLogger(__name__)
@@ -95,6 +102,7 @@ class InertialTracker:
         self._T_lw: core.Pose | None = None
         self._big_change = 0
         self._depth = 1.0
+        self._innovation: float | None = None
         self._last_covariance: FloatArray | None = None
         self._samples: FloatArray | None = None
         self._map_index = -1
@@ -123,6 +131,7 @@ class InertialTracker:
         State
             With the predicted motion and its covariance, if the IMU has started.
         """
+        self._innovation = None
         usable = interval is not None and interval.is_complete and len(interval.samples) > 1
         self._samples = interval.samples if usable and interval is not None else None
         followed = state.phase is TrackingState.OK and state.motion.last_frame is not None
@@ -227,7 +236,8 @@ class InertialTracker:
             return
         if estimate.covariance is not None:
             T_cw, covariance = estimate.by_image or frame.T_cw, self._of_image(estimate.covariance)
-            if estimate.by_image or self.filter.distance(T_cw, covariance) < _FAR:
+            self._innovation = self.filter.distance(T_cw, covariance)
+            if estimate.by_image or self._innovation < _FAR:
                 self.filter.update(T_cw, covariance)
                 self._n_contradictions = 0
             else:
@@ -264,6 +274,21 @@ class InertialTracker:
         """The image before had no pose of its own."""
         samples = self._samples
         return samples is not None and bool(self._last_seen < samples[0, 0] - 1e-6)
+
+    def record(self) -> InertialState | None:
+        """Return velocity and biases at the last image; None where the IMU has not started."""
+        if self.filter is None:
+            return None
+        bias = self.filter.bias
+        variances = np.diag(self.filter.covariance)[15:17]
+        return InertialState(
+            velocity=self.filter.velocity,
+            gyro_bias=bias[:3],
+            accel_bias=bias[3:],
+            gravity_tilt=float(np.hypot(*self.filter.tilt)),
+            gravity_deviation=math.sqrt(float(variances.max())),
+            innovation=self._innovation,
+        )
 
     def keyframe_made(self, keyframe: int, frame: core.TrackedFrame) -> None:
         """Note velocity and biases of a frame, the last one that was tracked, that is a keyframe."""
