@@ -42,8 +42,11 @@ from .slam.events import Relocalized as Relocalized
 from .slam.events import TrackingLost as TrackingLost
 from .slam.full_bundle_adjustment import FullAdjustmentRecord as FullAdjustmentRecord
 from .slam.full_bundle_adjustment import optimize_map as optimize_map
+from .slam.inertial import ImuCheck as ImuCheck
+from .slam.inertial import ImuVerdict as ImuVerdict
 from .slam.records import Evidence as Evidence
 from .slam.records import FrameFeatures as FrameFeatures
+from .slam.records import InertialState as InertialState
 from .slam.records import MapSummary as MapSummary
 from .slam.records import PoseMethod as PoseMethod
 from .slam.records import Reason as Reason

@@ -2,6 +2,7 @@
 #include "optimize/inertial_keyframes.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "inertial/inertial_filter.hpp"
 #include "optimize/bundle_gather.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 // Longest time between two keyframes that samples join [s].
 constexpr double kLongest = 5.0;
+// Times closer than this are the same [s]; seconds since 1970 are exact to 2e-7.
+constexpr double kSame = 1e-6;
 // Deviations of a bias from what it was before an adjustment, of the first motion of a chain that
 // nothing else holds: rad/s, m/s^2.
 constexpr double kGyroDeviation = 5e-3, kAccelDeviation = 0.1;
@@ -20,7 +23,7 @@ constexpr double kGyroDeviation = 5e-3, kAccelDeviation = 0.1;
 void InertialKeyframes::add_samples(const std::vector<ImuSample>& samples) {
   const std::lock_guard lock(mutex_);
   for (const ImuSample& sample : samples) {
-    if (samples_.empty() || sample.t > samples_.back().t + 1e-9) samples_.push_back(sample);
+    if (samples_.empty() || sample.t > samples_.back().t + kSame) samples_.push_back(sample);
   }
 }
 
@@ -78,8 +81,16 @@ std::shared_ptr<const Preintegration> InertialKeyframes::between(double begin, d
                                      [](const ImuSample& s, double t) { return s.t < t; });
   const std::vector<ImuSample> around(first, last);
   if (around.size() < 2) return nullptr;
-  auto motion =
-      std::make_shared<Preintegration>(samples_between(around, begin, end), noise_, bias);
+  std::vector<ImuSample> samples = samples_between(around, begin, end);
+  // Of two readings at nearly the same time the one at the end of the interval stays.
+  const auto same = [](const ImuSample& a, const ImuSample& b) { return !(b.t > a.t + kSame); };
+  samples.erase(samples.begin() + 1,
+                std::find_if(samples.begin() + 1, samples.end() - 1,
+                             [&](const ImuSample& s) { return !same(samples.front(), s); }));
+  while (samples.size() > 2 && same(samples[samples.size() - 2], samples.back())) {
+    samples.erase(samples.end() - 2);
+  }
+  auto motion = std::make_shared<Preintegration>(std::move(samples), noise_, bias);
   return motion->flags().n_gaps > 0 ? nullptr : motion;
 }
 
@@ -100,7 +111,7 @@ void InertialKeyframes::add_to(GatheredBundle& bundle, const std::vector<KeyFram
     motion.velocity = keyframe.T_cw.rotation().conjugate() * (factor * state->velocity);
     motion.bias = state->bias;
     const bool is_first = inertial.motions.empty();
-    motion.fixed = is_first && bundle.problem.cameras[camera->second].fixed;
+    // Also where its pose is fixed: a wrong bias must not stay because it was there before.
     if (is_first) {
       motion.bias_information << Eigen::Vector3d::Constant(1 / (kGyroDeviation * kGyroDeviation)),
           Eigen::Vector3d::Constant(1 / (kAccelDeviation * kAccelDeviation));

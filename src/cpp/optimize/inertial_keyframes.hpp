@@ -32,8 +32,8 @@ class InertialKeyframes {
 
   /// Newest keyframes with a state of a map, up to `n`, by time. The caller holds a lock of the map.
   std::vector<KeyFrameId> newest(const Map& map, MapIndex which, std::size_t n) const;
-  /// Adds motions of the cameras of a bundle that are in `chain`, and links between neighbours. The
-  /// first one is fixed if its camera is. The caller holds a lock of the map.
+  /// Adds motions of the cameras of a bundle that are in `chain`, and links between neighbours.
+  /// The caller holds a lock of the map.
   void add_to(GatheredBundle& bundle, const std::vector<KeyFrameId>& chain, const Map& map) const;
   /// Takes the motions of a solved bundle.
   void take_from(const GatheredBundle& bundle, const Map& map);

@@ -14,7 +14,7 @@ from orbslam2py.batches.names import key_of, label_of_parts
 from orbslam2py.batches.sweep import CONFIG_NAMES
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
-from orbslam2py.settings.imu_files import describes_imu, read_imu_settings
+from orbslam2py.settings.imu_files import imu_of_settings_file
 from orbslam2py.slam.options import SystemOptions
 
 #: Options of a run that a batch may have.
@@ -94,9 +94,9 @@ class Job:
             config={n: v for n, v in (*self.options, *self.parameters) if n in CONFIG_NAMES},
             **{name: given[name] for name in SYSTEM_OPTIONS if name in given},
         )
-        settings = None if self.settings is None else Path(self.settings)
-        describes = given.get("imu") is not False and settings and settings.is_file()
-        imu = read_imu_settings(settings) if describes and describes_imu(settings) else None
+        imu = None
+        if self.settings is not None and given.get("imu") is not False:
+            imu = imu_of_settings_file(Path(self.settings))
         return RunOptions(
             sensor,
             system,

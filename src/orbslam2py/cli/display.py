@@ -19,6 +19,7 @@ from orbslam2py.runs.report_page.explained import (
     loaded_map_words,
     relocalisations_words,
 )
+from orbslam2py.runs.report_page.imu_section import imu_words
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.slam.system import System
 
@@ -122,6 +123,8 @@ def _map_rows(report: dict[str, Any]) -> _Rows:
         yield "final adjustment", _describe_adjustment(report["final_adjustment"])
     if report.get("depth") is not None:
         yield "depth", depth_words(report)
+    if report.get("imu") is not None:
+        yield "IMU", imu_words(report)
 
 
 def _error_rows(report: dict[str, Any]) -> _Rows:

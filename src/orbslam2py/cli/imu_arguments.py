@@ -8,7 +8,7 @@ from pathlib import Path
 from orbslam2py.datasets import AccelUnit, GyroUnit, ImuSamples, read_imu_csv
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import ImuSettings, imu_noise, read_imu_settings
-from orbslam2py.settings.imu_files import describes_imu, has_imu_keys
+from orbslam2py.settings.imu_files import imu_of_settings_file
 
 
 def imu_settings_given(
@@ -33,11 +33,7 @@ def imu_settings_given(
     noise = None if chip is None else imu_noise(chip)
     if files:
         return read_imu_settings(*files, noise=noise)
-    if settings is None or not Path(settings).is_file() or not has_imu_keys(Path(settings)):
-        return None
-    if noise is None and not describes_imu(Path(settings)):
-        return None
-    return read_imu_settings(settings, noise=noise)
+    return None if settings is None else imu_of_settings_file(Path(settings), noise)
 
 
 def check_units(

@@ -24,6 +24,7 @@ from orbslam2py.errors import DatasetError
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.runs.frame_errors import truth_of_frames, worst_frames
 from orbslam2py.runs.frame_table import begin_frames, has_no_frames, write_frames
+from orbslam2py.runs.imu_table import has_imu_states, write_imu_states
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page import write_report_page
 from orbslam2py.runs.report_page.frame_images import (
@@ -46,7 +47,7 @@ _SETTINGS = "settings.yaml"
 _NOT_ALWAYS = (
     *("trajectory.txt", "trajectory_online.txt", "trajectory_kitti.txt", "keyframes.txt"),
     *("trajectory.png", "maps.png", "trajectory_map*.txt", "groundtruth_aligned.txt"),
-    *("report.html", "frame_images.zip"),
+    *("report.html", "frame_images.zip", "imu_states.csv"),
 )
 
 #: By it a folder is known as that of a run: the first to come, without frames, the last to go.
@@ -238,6 +239,8 @@ class OutputWriter:
     ) -> None:
         """Write all files of the run; the page and its images only if they are wanted."""
         self._write(_MARK, lambda path: write_frames(path, result.rows))
+        if has_imu_states(result.rows):
+            self._write("imu_states.csv", lambda path: write_imu_states(path, result.rows))
         self._write(_SETTINGS, result.settings.save)
         self._write_trajectories(result, evaluation)
         points = anchored_points(result)

@@ -85,13 +85,29 @@ def has_imu_keys(path: Path) -> bool:
         return False
 
 
-def describes_imu(path: Path) -> bool:
-    """Whether a settings file tells noise and place of an IMU; parts of that are not enough."""
+def imu_of_settings_file(path: Path, noise: ImuNoise | None = None) -> ImuSettings | None:
+    """Read what a settings file of a camera also says of an IMU.
+
+    Parameters
+    ----------
+    path
+        The file.
+    noise
+        Used where the file states none.
+
+    Returns
+    -------
+    ImuSettings or None
+        None if there is no such file or it says nothing. What is incomplete or wrong is logged as a
+        warning, since the camera can be used without it.
+    """
+    if not path.is_file() or not has_imu_keys(path):
+        return None
     try:
-        found = _statements_of(path)
-    except SettingsError:
-        return False
-    return all(name in found for name in _NOISE) and ("T_ci" in found or "T_bc" in found)
+        return read_imu_settings(path, noise=noise)
+    except SettingsError as error:
+        _log.warning("the IMU is not used: %s", error)
+        return None
 
 
 def _files_of(paths: tuple[str | PathLike[str], ...]) -> list[Path]:
@@ -181,6 +197,8 @@ _ORB_SLAM3: _Keys = {
     "IMU.T_b_c1": ("T_bc", _matrix),
     "Tbc": ("T_bc", _matrix),
 }
+#: Keys of a settings file that describe the IMU.
+IMU_KEYS = frozenset(_ORB_SLAM3)
 _EUROC: _Keys = {
     "gyroscope_noise_density": ("gyro_noise", _number),
     "gyroscope_random_walk": ("gyro_walk", _number),

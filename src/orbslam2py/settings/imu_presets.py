@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Noise of IMUs by the name of the chip, for those who have not measured theirs.
 
-Noise densities are the typical values that the makers state. They were not compared with the
-current data sheets: check yours. Makers do not state random walks of the bias. The values here are
-guesses for the class of the chip. A calibration of your IMU is better than a preset.
+Noise densities are the typical values of the makers' data sheets, whose numbers stand beside them.
+They were not compared with the current revisions: check yours. Makers do not state random walks of
+the bias. The values here are guesses for the class of the chip. A calibration of your IMU is better
+than a preset.
 """
 
 from __future__ import annotations
@@ -53,25 +54,25 @@ def _chip(gyro: float, accel: float, walks: tuple[float, float], source: str) ->
         gyro * _DEGREE,
         accel * _MICRO_G,
         *walks,
-        f"typical value of the maker, not checked: {source}",
+        f"typical value of the data sheet, revision not checked: {source}",
     )
 
 
 #: By the name of the chip in lower case.
 IMU_NOISE = {
-    "mpu6050": _chip(0.005, 400, _CONSUMER, "InvenSense MPU-6000/6050"),
-    "mpu9250": _chip(0.01, 300, _CONSUMER, "InvenSense MPU-9250"),
-    "icm20602": _chip(0.004, 100, _CONSUMER, "TDK InvenSense ICM-20602"),
-    "icm20948": _chip(0.015, 230, _CONSUMER, "TDK InvenSense ICM-20948"),
-    "icm42688": _chip(0.0028, 70, _CONSUMER, "TDK InvenSense ICM-42688-P"),
-    "bmi055": _chip(0.014, 150, _CONSUMER, "Bosch BMI055"),
-    "bmi085": _chip(0.014, 135, _CONSUMER, "Bosch BMI085"),
-    "bmi088": _chip(0.014, 175, _CONSUMER, "Bosch BMI088"),
-    "bmi160": _chip(0.007, 180, _CONSUMER, "Bosch BMI160"),
-    "bmi270": _chip(0.007, 160, _CONSUMER, "Bosch BMI270"),
-    "lsm6ds3": _chip(0.007, 90, _CONSUMER, "ST LSM6DS3"),
-    "lsm6dsl": _chip(0.004, 90, _CONSUMER, "ST LSM6DSL"),
-    "lsm6dso": _chip(0.0038, 70, _CONSUMER, "ST LSM6DSO"),
+    "mpu6050": _chip(0.005, 400, _CONSUMER, "InvenSense MPU-6000/6050 (PS-MPU-6000A-00)"),
+    "mpu9250": _chip(0.01, 300, _CONSUMER, "InvenSense MPU-9250 (PS-MPU-9250A-01)"),
+    "icm20602": _chip(0.004, 100, _CONSUMER, "TDK InvenSense ICM-20602 (DS-000176)"),
+    "icm20948": _chip(0.015, 230, _CONSUMER, "TDK InvenSense ICM-20948 (DS-000189)"),
+    "icm42688": _chip(0.0028, 70, _CONSUMER, "TDK InvenSense ICM-42688-P (DS-000347)"),
+    "bmi055": _chip(0.014, 150, _CONSUMER, "Bosch BMI055 (BST-BMI055-DS000)"),
+    "bmi085": _chip(0.014, 135, _CONSUMER, "Bosch BMI085 (BST-BMI085-DS001)"),
+    "bmi088": _chip(0.014, 175, _CONSUMER, "Bosch BMI088 (BST-BMI088-DS001)"),
+    "bmi160": _chip(0.007, 180, _CONSUMER, "Bosch BMI160 (BST-BMI160-DS000)"),
+    "bmi270": _chip(0.007, 160, _CONSUMER, "Bosch BMI270 (BST-BMI270-DS000)"),
+    "lsm6ds3": _chip(0.007, 90, _CONSUMER, "ST LSM6DS3 (DocID026899)"),
+    "lsm6dsl": _chip(0.004, 90, _CONSUMER, "ST LSM6DSL (DocID028475)"),
+    "lsm6dso": _chip(0.0038, 70, _CONSUMER, "ST LSM6DSO (DS12140)"),
     "adis16448": _chip(0.0135, 230, _INDUSTRIAL, "Analog Devices ADIS16448"),
     "adis16470": _chip(0.008, 100, _INDUSTRIAL, "Analog Devices ADIS16470"),
 }

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 
+from orbslam2py.settings.imu_files import IMU_KEYS
 from orbslam2py.settings.keys import FISHEYE_KEYS, KEYS, RECTIFICATION_KEYS, nearest_key
 from orbslam2py.settings.opencv_yaml import Entry, parse_number
 
@@ -64,8 +65,10 @@ def unused_keys(entries: Iterable[Entry]) -> str | None:
     names: dict[str, None] = {}
     for entry in entries:
         group, dot, last = entry.key.rpartition(".")
+        if entry.key in IMU_KEYS:
+            continue  # read_imu_settings takes them
         if group.lower() != "file" and not _OF_NO_EFFECT.fullmatch(last):
-            of_ours = group.lower() in _OUR_GROUPS
+            of_ours = group.lower() in (*_OUR_GROUPS, "imu")
             names[entry.key if of_ours or not dot else f"{group}.*"] = None
     if not names:
         return None

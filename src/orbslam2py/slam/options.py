@@ -17,7 +17,7 @@ from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
 from orbslam2py.settings.imu import ImuSettings
-from orbslam2py.settings.imu_files import describes_imu, read_imu_settings
+from orbslam2py.settings.imu_files import imu_of_settings_file, read_imu_settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.config import PRESETS, Config, value_of
@@ -146,7 +146,7 @@ class Setup:
         if loaded is not None:
             check_sensor(loaded, sensor)
         if imu is None and not isinstance(settings, Settings):
-            imu = _imu_of_file(settings)
+            imu = imu_of_settings_file(Path(settings))
         settings = resolve_settings(settings, sensor)
         words = (
             vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
@@ -166,12 +166,6 @@ class Setup:
             _pose_given(initial_T_wc),
             _imu_of_camera(imu, settings),
         )
-
-
-def _imu_of_file(settings: str | Path) -> Path | None:
-    """The settings file, if it also describes an IMU beside the camera."""
-    path = Path(settings)
-    return path if path.is_file() and describes_imu(path) else None
 
 
 def _imu_of_camera(imu: ImuSettings | str | Path | None, settings: Settings) -> ImuSettings | None:

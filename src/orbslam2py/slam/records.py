@@ -144,6 +144,25 @@ class FrameFeatures(EqualByValue):
 
 
 @dataclass(frozen=True, eq=False)
+class InertialState(EqualByValue):
+    """Velocity and biases at an image, by camera and IMU together."""
+
+    velocity: FloatArray
+    """(3,) of the IMU in the world, m/s (one camera: the map's units)."""
+    gyro_bias: FloatArray
+    """(3,) rad/s."""
+    accel_bias: FloatArray
+    """(3,) m/s^2."""
+    gravity_tilt: float
+    """Angle between gravity and the vertical of the map, rad."""
+    gravity_deviation: float
+    """Standard deviation of that angle, rad."""
+    innovation: float | None
+    """Squared Mahalanobis distance of the image's pose from the predicted one (6 degrees of
+    freedom); None where the image gave no pose."""
+
+
+@dataclass(frozen=True, eq=False)
 class TrackingRecord(EqualByValue):
     """Result of one track call; two are equal if all fields are, arrays number by number."""
 
@@ -184,6 +203,8 @@ class TrackingRecord(EqualByValue):
     method: PoseMethod | None = None
     """What found the pose; `PoseMethod.IMU`: the IMU alone, for the image shows too little. None
     without a pose, and in the frame that begins a map."""
+    inertial: InertialState | None = None
+    """Velocity and biases; None where the IMU is not used."""
 
     @property
     def T_wc(self) -> FloatArray | None:

@@ -251,7 +251,7 @@ class Tracking:
         if not estimate.found:
             begun = self._begin_map_beside(frame, timer, localize=localize)
             return begun or self._lose(frame, estimate)
-        if self._state.is_lost:
+        if self._state.is_lost or estimate.unconfirmed:
             estimate = replace(estimate, unconfirmed=True)
             self._apply(Relocalized(frame, estimate.n_inliers))
         else:

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "analytic_motion.hpp"
+#include "support/analytic_motion.hpp"
 
 namespace orbslam {
 namespace {

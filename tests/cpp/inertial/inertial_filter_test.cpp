@@ -6,7 +6,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "analytic_motion.hpp"
+#include "support/analytic_motion.hpp"
 
 namespace orbslam {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "analytic_motion.hpp"
+#include "support/analytic_motion.hpp"
 
 namespace orbslam {
 namespace {

@@ -9,7 +9,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "analytic_motion.hpp"
+#include "support/analytic_motion.hpp"
 #include "inertial/so3.hpp"
 
 namespace orbslam {

@@ -13,6 +13,7 @@ from typing import Any
 from orbslam2py._version import __version__
 from orbslam2py.runs.report_page import sections
 from orbslam2py.runs.report_page.explained import compared_over, is_of_last_map_only
+from orbslam2py.runs.report_page.imu_section import imu_section
 from orbslam2py.runs.report_page.maps_section import maps_section
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import path_section
@@ -55,13 +56,14 @@ def run_page(run: RunFolder) -> str:
         "path": path_section(story),
         "error": sections.error_section(story),
         "tracking": sections.tracking_section(story),
+        "imu": imu_section(story),
         "times": sections.time_section(story),
         "images": sections.images_section(story),
         "maps": maps_section(story),
         "figures": sections.figures_section(story),
         "repeat": repeat_section(report),
     }
-    titles = {"error": "Error", "figures": "All figures"}
+    titles = {"error": "Error", "figures": "All figures", "imu": "IMU"}
     links = [(name, titles.get(name, name.capitalize())) for name, part in parts.items() if part]
     told = f"{report.get('sensor')}, {report.get('layout')}"
     when = report.get("started")

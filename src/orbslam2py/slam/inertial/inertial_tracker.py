@@ -18,7 +18,14 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.slam.inertial.imu_buffer import ImuInterval
 from orbslam2py.slam.inertial.inertial_views import InertialViews
-from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason, TrackingState, Verdict
+from orbslam2py.slam.records import (
+    InertialState,
+    PoseEstimate,
+    PoseMethod,
+    Reason,
+    TrackingState,
+    Verdict,
+)
 from orbslam2py.slam.state import Motion, State, Velocity
 
 _log = logging.getLogger(__name__)
@@ -95,6 +102,7 @@ class InertialTracker:
         self._T_lw: core.Pose | None = None
         self._big_change = 0
         self._depth = 1.0
+        self._innovation: float | None = None
         self._last_covariance: FloatArray | None = None
         self._samples: FloatArray | None = None
         self._map_index = -1
@@ -125,6 +133,7 @@ class InertialTracker:
         State
             With the predicted motion and its covariance, if the IMU has started.
         """
+        self._innovation = None
         usable = interval is not None and interval.is_complete and len(interval.samples) > 1
         self._samples = interval.samples if usable and interval is not None else None
         followed = state.phase is TrackingState.OK and state.motion.last_frame is not None
@@ -171,7 +180,7 @@ class InertialTracker:
             moved = T_cw @ self._T_lw.inverse() @ T_lw
             if last.big_change != self._big_change:
                 self.filter.move(moved)
-            elif self._last_covariance is not None and np.any((T_cw @ moved.inverse()).log()):
+            elif self._last_covariance is not None and _differ(self._T_lw, T_lw):
                 self.filter.update(moved, self._last_covariance)
         self._T_lw = T_lw
         self._big_change = last.big_change
@@ -192,6 +201,10 @@ class InertialTracker:
             The last frame with a pose of its own.
         """
         if estimate.found and self._contradicts(frame, estimate):
+            if _is_strong(estimate):
+                # The image says where it is, as after a loss: the next one has to confirm it.
+                self.forget()
+                return replace(estimate, unconfirmed=True)
             estimate = estimate.failed(Reason.WEAK_EVIDENCE)
         if estimate.found:
             return estimate
@@ -201,11 +214,12 @@ class InertialTracker:
         """Whether a pose with little evidence, or the first one after a gap, is too far off."""
         if self.filter is None or frame.T_cw is None or estimate.covariance is None:
             return False
-        evidence = estimate.evidence
-        strong = evidence is not None and evidence.verdict is Verdict.STRONG
-        if strong and not self._leads:
+        if _is_strong(estimate) and not self._leads:
             return False
-        return self.filter.distance(frame.T_cw, estimate.covariance) > _FAR
+        # The stated covariance of a weak pose holds the difference to the prediction itself.
+        covariance = estimate.covariance if _is_strong(estimate) else np.zeros((6, 6))
+        far = self.filter.distance(frame.T_cw, self._of_image(covariance))
+        return far > _FAR
 
     def tracked(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> None:
         """Take the pose of an image.
@@ -227,7 +241,8 @@ class InertialTracker:
             return
         if estimate.covariance is not None:
             T_cw, covariance = estimate.by_image or frame.T_cw, self._of_image(estimate.covariance)
-            if estimate.by_image or self.filter.distance(T_cw, covariance) < _FAR:
+            self._innovation = self.filter.distance(T_cw, covariance)
+            if estimate.by_image or self._innovation < _FAR:
                 self.filter.update(T_cw, covariance)
                 self._n_contradictions = 0
             else:
@@ -264,6 +279,21 @@ class InertialTracker:
         """The image before had no pose of its own."""
         samples = self._samples
         return samples is not None and bool(self._last_seen < samples[0, 0] - 1e-6)
+
+    def record(self) -> InertialState | None:
+        """Return velocity and biases at the last image; None where the IMU has not started."""
+        if self.filter is None:
+            return None
+        bias = self.filter.bias
+        variances = np.diag(self.filter.covariance)[15:17]
+        return InertialState(
+            velocity=self.filter.velocity,
+            gyro_bias=bias[:3],
+            accel_bias=bias[3:],
+            gravity_tilt=float(np.hypot(*self.filter.tilt)),
+            gravity_deviation=math.sqrt(float(variances.max())),
+            innovation=self._innovation,
+        )
 
     def keyframe_made(self, keyframe: int, frame: core.TrackedFrame) -> None:
         """Note velocity and biases of a frame, the last one that was tracked, that is a keyframe."""
@@ -369,6 +399,16 @@ class InertialTracker:
         self._T_lw = state.motion.last.T_cw
         self._big_change = state.motion.last.big_change
         return state
+
+
+def _differ(one: core.Pose, other: core.Pose) -> bool:
+    """Whether two poses are others by more than rounding."""
+    return max(one.difference(other)) > 1e-7
+
+
+def _is_strong(estimate: PoseEstimate) -> bool:
+    evidence = estimate.evidence
+    return evidence is not None and evidence.verdict is Verdict.STRONG
 
 
 def _is_determined(start: core.InertialStart) -> bool:
