@@ -3585,12 +3585,13 @@ def optimize_essential_graph(correction: LoopCorrection, abort: StopFlag | None 
     every run. Returns a PoseGraphSummary.
     """
 @typing.overload
-def optimize_pose(frame: TrackedFrame) -> PoseEstimate:
+def optimize_pose(frame: TrackedFrame, prior: PosePrior | None = None) -> PoseEstimate:
     """
     Pose of a frame from its associated points, starting at its T_cw; writes T_cw and the
     outlier flags. Four rounds of damped least squares with a Huber kernel (off in the last);
     outliers are judged anew after each. Fewer than 3 associations: pose unchanged, no
-    inliers. Raises StateError when the frame has no pose.
+    inliers. With a prior (PosePrior) any number is enough, and the covariance is that of both
+    together. Raises StateError when the frame has no pose.
     """
 @typing.overload
 def optimize_pose(T_cw: Pose, camera: Camera, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> PoseEstimate:

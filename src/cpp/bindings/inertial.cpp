@@ -10,6 +10,8 @@
 
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "inertial/inertial_filter.hpp"
+#include "inertial/inertial_start.hpp"
 #include "inertial/preintegration.hpp"
 
 namespace orbslam::bindings {
@@ -156,8 +158,135 @@ void bind_preintegration(py::module_& module) {
           "(0, 0, -9.81) where z is up. bias: (6,), by default that of the integration.");
 }
 
+ImuNoise noise_of(const Eigen::Vector4d& noise) { return {noise(0), noise(1), noise(2), noise(3)}; }
+
+constexpr const char* kFilterDoc =
+    R"(Gaussian over the state of an IMU in a map, from image to image.
+
+Errors are ordered (rotation [rad], velocity [m/s], position [m], gyro bias [rad/s], accelerometer
+bias [m/s^2], tilt of gravity about the first two axes of the world [rad], logarithm of the scale):
+18. That of the rotation acts on the right, velocity and position are added in the world, whose third
+axis is up. The scale is units of the map per metre.)";
+
+void bind_filter(py::module_& module) {
+  using F = InertialFilter;
+  py::class_<F>(module, "InertialFilter", kFilterDoc)
+      .def(py::init([](const Pose& T_cb, const Eigen::Vector4d& noise, const Pose& T_wb,
+                       const Eigen::Vector3d& velocity, const Vector6d& bias,
+                       const F::Covariance& covariance) {
+             return F(T_cb, noise_of(noise), {T_wb, velocity}, bias_of(bias), covariance);
+           }),
+           "T_cb"_a, "noise"_a, "T_wb"_a, "velocity"_a, "bias"_a, "covariance"_a,
+           "T_cb: Pose from the IMU to the camera. noise: (4,), densities of gyro and "
+           "accelerometer, and of the walks of their biases, in the units of `Preintegration`. "
+           "T_wb, velocity (3,), bias (6,), covariance (18, 18): the state at first.")
+      .def(
+          "predict",
+          [](F& f, const Input<double>& samples, double scale_walk) {
+            f.predict(imu_samples_of(samples), scale_walk);
+          },
+          "samples"_a, "scale_walk"_a = 0.0,
+          "From the first sample (n, 7) to the last. scale_walk: random walk of the logarithm of "
+          "the scale [1/sqrt(s)]. Raises ValueError as Preintegration does.")
+      .def(
+          "pose",
+          [](const F& f) {
+            const PoseGaussian pose = f.pose();
+            return py::make_tuple(pose.T_cw, pose.covariance);
+          },
+          "Pose `T_cw` of the camera and its covariance (6, 6): rotation, translation; left "
+          "perturbation.")
+      .def("fuse", &F::fuse, "T_cw"_a, "covariance"_a, "inflation"_a = 1.0,
+           "Take the pose of an image that was estimated with `pose` as prior, and its covariance. "
+           "What the image tells counts 1 / inflation times.")
+      .def("update", &F::update, "T_cw"_a, "covariance"_a,
+           "Take the pose of an image that was estimated without a prior.")
+      .def("distance", &F::distance, "T_cw"_a, "covariance"_a,
+           "Squared Mahalanobis distance of a pose with this covariance: 6 degrees of freedom.")
+      .def("move", &F::move, "T_cw"_a,
+           "The map was moved: the camera's pose is this one now; the velocity turns with it.")
+      .def(
+          "transform",
+          [](F& f, double scale, const Pose& pose) {
+            f.transform(pose.rotation(), scale, pose.translation());
+          },
+          "scale"_a, "pose"_a,
+          "The map was moved: `x' = scale R x + t`. Tilt and scale are 0 afterwards.")
+      .def_property_readonly("T_wb", [](const F& f) { return f.state().T_wb; },
+                             "Pose of the IMU in the world.")
+      .def_property_readonly("velocity", [](const F& f) { return f.state().velocity; },
+                             "Of the IMU in the world (3,) [m/s].")
+      .def_property_readonly("bias", [](const F& f) { return to_vector(f.bias()); },
+                             "(6,): gyro [rad/s], accelerometer [m/s^2].")
+      .def_property_readonly("tilt", &F::tilt,
+                             "Rotation [rad] about the first two axes of the world from "
+                             "(0, 0, -9.81) to gravity (2,).")
+      .def_property_readonly("log_scale", &F::log_scale, "Logarithm of the scale.")
+      .def_property_readonly("gravity", &F::gravity, "In the world (3,) [m/s^2].")
+      .def_property_readonly("covariance", &F::covariance, "(18, 18).");
+}
+
+InertialStart start_of(const std::vector<double>& times, const std::vector<Pose>& T_wc,
+                       const std::vector<Input<double>>& samples, const Pose& T_cb,
+                       const Eigen::Vector4d& noise, bool metric, double rotation_deviation,
+                       double position_deviation, const Vector6d& bias, double gyro_deviation,
+                       double accel_deviation) {
+  if (times.size() != T_wc.size()) throw py::value_error("as many times as poses are needed");
+  std::vector<InertialView> views;
+  for (std::size_t i = 0; i < times.size(); ++i) views.push_back({times[i], T_wc[i]});
+  std::vector<std::vector<ImuSample>> between;
+  for (const auto& array : samples) between.push_back(imu_samples_of(array));
+  InertialStartOptions options;
+  options.metric = metric;
+  options.rotation_deviation = rotation_deviation;
+  options.position_deviation = position_deviation;
+  options.bias = bias_of(bias);
+  options.gyro_deviation = gyro_deviation;
+  options.accel_deviation = accel_deviation;
+  const py::gil_scoped_release release;
+  return estimate_inertial_start(views, between, T_cb, noise_of(noise), options);
+}
+
+void bind_start(py::module_& module) {
+  using S = InertialStart;
+  py::class_<S>(module, "InertialStart", "What estimate_inertial_start found.")
+      .def_readonly("solved", &S::solved, "False: the rest means nothing.")
+      .def_readonly("gravity", &S::gravity, "Free fall in the map (3,) [m/s^2].")
+      .def_readonly("gravity_length", &S::gravity_length,
+                    "Its length if it is not known to be 9.81: a check.")
+      .def_readonly("scale", &S::scale, "Metres per unit of the map.")
+      .def_property_readonly("bias", [](const S& s) { return to_vector(s.bias); },
+                             "(6,): gyro [rad/s], accelerometer [m/s^2].")
+      .def_readonly("velocities", &S::velocities,
+                    "Of the IMU at the views, (3,) each [m/s], in the axes of the map.")
+      .def_readonly("scale_deviation", &S::scale_deviation, "Of the logarithm of the scale.")
+      .def_readonly("gravity_deviation", &S::gravity_deviation, "Of its direction [rad].")
+      .def_readonly("cost", &S::cost, "Weighted sum of squared residuals.")
+      .def_readonly("freedom", &S::freedom, "Degrees of freedom of the cost.")
+      .def_readonly("covariance", &S::covariance,
+                    "(18, 18) of the last view, in the order of InertialFilter, once the map has "
+                    "been turned by `up` and multiplied by `scale`.")
+      .def_property_readonly(
+          "up", [](const S& s) { return Pose(s.up, Eigen::Vector3d::Zero()); },
+          "Pose that turns gravity to (0, 0, -9.81).");
+  module.def("estimate_inertial_start", &start_of, "times"_a, "T_wc"_a, "samples"_a, "T_cb"_a,
+             "noise"_a, py::kw_only(), "metric"_a, "rotation_deviation"_a, "position_deviation"_a,
+             "bias"_a = Vector6d(Vector6d::Zero()), "gyro_deviation"_a = 0.1,
+             "accel_deviation"_a = 0.2,
+             "Gravity, scale, biases and velocities from poses of the camera in a map and the "
+             "samples between them (Campos et al., ICRA 2020).\n\n"
+             "times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of "
+             "InertialFilter. metric: the unit of the map is the metre. Deviations of the views' "
+             "rotations [rad] and positions [units of the map]; bias (6,) with the deviations of "
+             "gyro [rad/s] and accelerometer [m/s^2]: what is known before. Raises ValueError.");
+}
+
 }  // namespace
 
-void bind_inertial(py::module_& module) { bind_preintegration(module); }
+void bind_inertial(py::module_& module) {
+  bind_preintegration(module);
+  bind_filter(module);
+  bind_start(module);
+}
 
 }  // namespace orbslam::bindings

@@ -12,6 +12,7 @@
 #include "map/invariants.hpp"
 #include "map/keyframe_insertion.hpp"
 #include "map/local_map.hpp"
+#include "map/map_transform.hpp"
 #include "map/scene_depth.hpp"
 #include "map/sightings.hpp"
 
@@ -224,6 +225,11 @@ void bind_parts(MapClass& map) {
             return n;
           },
           "map"_a, Release(), "Number of living points of a map.")
+      .def("is_upright", reader(&Map::is_upright), "map"_a, Release(),
+           "Whether the third axis of the map's world is up, by an IMU, and its unit is the metre. "
+           "Trajectories of other maps are relative to their first keyframe.")
+      .def("set_upright", writer(&Map::set_upright), "map"_a, Release(),
+           "Note that it is so.")
       .def("begin_map", writer(&Map::begin_map), Release(),
            "The next keyframe begins a map, which becomes the active one; its number. Nothing\n"
            "changes while the active one has no keyframe.")
@@ -371,6 +377,14 @@ void bind_local_map(py::module_& module) {
       "Bring an earlier frame up to date: its pose follows its keyframe, replaced points their\n"
       "successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much\n"
       "lengths around the frame have been multiplied since).");
+  module.def(
+      "transform_map",
+      [](Map& map, MapIndex which, double scale, const Pose& pose) {
+        transform_map(map, which, Similarity(scale, pose.rotation(), pose.translation()));
+      },
+      "map"_a, "which"_a, "scale"_a, "pose"_a, Release(),
+      "Move all keyframes and points of a map: `x' = scale R x + t` with R, t of the pose. Counts as "
+      "a big change; nobody may work on the map meanwhile.");
   module.def("select_local_map", &select_local_map, "map"_a, "frame"_a, Release(),
              "Keyframes voted for by the frame's points, extended, and all their points.");
   module.def(

@@ -79,13 +79,26 @@ void bind_pose_optimization(py::module_& module) {
                     "perturbation, scaled by the residual variance. Zero: nothing estimated.")
       .def_readonly("iterations", &PoseEstimate::iterations, "Of all rounds together.");
 
+  py::class_<PosePrior>(module, "PosePrior",
+                        "Gaussian of a pose: `T_cw = exp(e) mean`, with `e` (rotation [rad],\n"
+                        "translation) of mean zero.")
+      .def(py::init([](const Pose& mean, const Matrix6d& information) {
+             return PosePrior{mean, information};
+           }),
+           "mean"_a, "information"_a,
+           "mean: Pose `T_cw`. information: (6, 6) float64, inverse of the covariance.")
+      .def_readonly("mean", &PosePrior::mean, "Pose `T_cw`.")
+      .def_readonly("information", &PosePrior::information, "(6, 6) float64.");
+
   module.def(
-      "optimize_pose", [](TrackedFrame& frame) { return optimize_pose(frame); }, "frame"_a,
-      py::call_guard<py::gil_scoped_release>(),
+      "optimize_pose",
+      [](TrackedFrame& frame, const PosePrior* prior) { return optimize_pose(frame, prior); },
+      "frame"_a, "prior"_a = py::none(), py::call_guard<py::gil_scoped_release>(),
       "Pose of a frame from its associated points, starting at its T_cw; writes T_cw and the\n"
       "outlier flags. Four rounds of damped least squares with a Huber kernel (off in the last);\n"
       "outliers are judged anew after each. Fewer than 3 associations: pose unchanged, no\n"
-      "inliers. Raises StateError when the frame has no pose.");
+      "inliers. With a prior (PosePrior) any number is enough, and the covariance is that of both\n"
+      "together. Raises StateError when the frame has no pose.");
   module.def(
       "pose_covariance", &pose_covariance, "frame"_a, py::call_guard<py::gil_scoped_release>(),
       "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"
@@ -235,7 +248,50 @@ void bind_bundle(py::module_& module) {
       "shapes or indices.");
 }
 
+void bind_inertial_keyframes(py::module_& module) {
+  using K = InertialKeyframes;
+  py::class_<K>(module, "InertialKeyframes",
+                "Samples of an IMU, and its velocities and biases at keyframes.")
+      .def(py::init([](const Pose& T_cb, const Eigen::Vector4d& noise) {
+             return std::make_unique<K>(T_cb, ImuNoise{noise(0), noise(1), noise(2), noise(3)});
+           }),
+           "T_cb"_a, "noise"_a, "As of InertialFilter.")
+      .def("__len__", &K::size)
+      .def(
+          "add_samples",
+          [](K& self, const Input<double>& array) {
+            std::vector<ImuSample> samples(rows_of(array, 7, "samples"));
+            for (std::size_t i = 0; i < samples.size(); ++i) {
+              const double* row = array.data() + 7 * i;
+              samples[i] = {row[0], {row[1], row[2], row[3]}, {row[4], row[5], row[6]}};
+            }
+            self.add_samples(samples);
+          },
+          "samples"_a, "Samples (n, 7) after those before, which they may overlap by one.")
+      .def(
+          "set",
+          [](K& self, KeyFrameId keyframe, const Eigen::Vector3d& velocity, const Vector6d& bias) {
+            self.set(keyframe, velocity, {bias.head<3>(), bias.tail<3>()});
+          },
+          "keyframe"_a, "velocity"_a, "bias"_a,
+          "Velocity of the IMU (3,) [m/s] in the axes of the camera of a keyframe that was just "
+          "inserted, and its bias (6,).")
+      .def(
+          "find",
+          [](const K& self, KeyFrameId keyframe) -> py::object {
+            Eigen::Vector3d velocity;
+            ImuBias bias;
+            if (!self.find(keyframe, velocity, bias)) return py::none();
+            Vector6d both;
+            both << bias.gyro, bias.accel;
+            return py::make_tuple(velocity, both);
+          },
+          "keyframe"_a, "Velocity (3,) and bias (6,) of a keyframe, as of `set`; or None.")
+      .def("clear", &K::clear, "Forget everything.");
+}
+
 void bind_local_bundle(py::module_& module) {
+  bind_inertial_keyframes(module);
   py::class_<LocalBundleResult>(module, "LocalBundleResult", "What local_bundle_adjustment did.")
       .def_readonly("n_local_keyframes", &LocalBundleResult::n_local_keyframes,
                     "The keyframe and its neighbours.")
@@ -243,22 +299,25 @@ void bind_local_bundle(py::module_& module) {
                     "Cameras held still, local or not.")
       .def_readonly("n_points", &LocalBundleResult::n_points, "Points refined.")
       .def_readonly("n_observations", &LocalBundleResult::n_observations, "Observations used.")
+      .def_readonly("n_imu_links", &LocalBundleResult::n_imu_links, "Residuals of the IMU.")
       .def_readonly("n_erased", &LocalBundleResult::n_erased, "Observations erased as outliers.")
       .def_readonly("committed", &LocalBundleResult::committed, "Whether the map was changed.")
       .def_readonly("summary", &LocalBundleResult::summary, "Of the solver.");
   module.def(
       "local_bundle_adjustment",
       [](Map& map, KeyFrameId keyframe, const std::shared_ptr<StopFlag>& abort, bool monocular,
-         int n_threads, const std::string& solver) {
+         int n_threads, const std::string& solver, InertialKeyframes* inertial) {
         const BundleSolver chosen = solver_named(solver);
         const py::gil_scoped_release release;
-        return local_bundle_adjustment(map, keyframe, flag_of(abort), monocular, n_threads, chosen);
+        return local_bundle_adjustment(map, keyframe, flag_of(abort), monocular, n_threads, chosen,
+                                       inertial);
       },
       "map"_a, "keyframe"_a, "abort"_a = py::none(), "monocular"_a = false, "n_threads"_a = 1,
-      "solver"_a = name_of(BundleOptions().solver),
+      "solver"_a = name_of(BundleOptions().solver), "inertial"_a = py::none(),
       "Refine a keyframe, its neighbours and all their points; other observers are fixed.\n\n"
       "`abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for\n"
-      "the scale. `solver`: of BundleOptions. Takes the map's locks for short sections only. A\n"
+      "the scale. `solver`: of BundleOptions. `inertial`: InertialKeyframes, whose newest ones are\n"
+      "local, too, with residuals of the IMU between them; or None. Takes the map's locks for short sections only. A\n"
       "dead or unknown keyframe gives an empty result, a reset meanwhile drops it.");
 }
 

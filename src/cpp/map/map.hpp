@@ -102,6 +102,10 @@ class Map {
   KeyFrameId root(MapIndex map) const;
   bool is_root(const KeyFrame& keyframe) const { return root(keyframe.map) == keyframe.id; }
   std::size_t n_keyframes_of(MapIndex map) const;  ///< published ones only
+  /// The third axis of the map's world is up, by an IMU, and its unit is the metre. Trajectories of
+  /// other maps are relative to the root.
+  bool is_upright(MapIndex map) const;
+  void set_upright(MapIndex map);
   /// The next keyframe begins a map beside the present ones, which becomes the active one. Nothing
   /// changes while the active one has no keyframe. Returns the active map.
   MapIndex begin_map();
@@ -222,6 +226,7 @@ class Map {
   struct Part {
     KeyFrameId root;
     std::size_t n_published = 0;
+    bool upright = false;
   };
   struct ArchivedKeyFrame {
     KeyFrameId parent;

@@ -42,6 +42,16 @@ std::size_t Map::n_keyframes_of(MapIndex map) const {
   return part == parts_.end() ? 0 : part->second.n_published;
 }
 
+bool Map::is_upright(MapIndex map) const {
+  const auto part = parts_.find(map);
+  return part != parts_.end() && part->second.upright;
+}
+
+void Map::set_upright(MapIndex map) {
+  const auto part = parts_.find(map);
+  if (part != parts_.end()) part->second.upright = true;
+}
+
 MapIndex Map::begin_map() {
   if (parts_.at(active_map()).root.valid()) {
     parts_.emplace(++last_map_, Part());

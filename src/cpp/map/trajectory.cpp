@@ -126,7 +126,7 @@ Trajectory TrajectoryRecorder::rebuild(const Map& map, MapIndex which) const {
 
   const KeyFrameId root = map.root(which);
   Pose T_0w;
-  if (map.find(root)) T_0w = map.T_cw(root);
+  if (map.find(root) && !map.is_upright(which)) T_0w = map.T_cw(root);
   KeyFrameId reference;
   ScaledPose T_rw;
   Pose T_0r;  // frames follow each other under one reference: walk its chain of parents once

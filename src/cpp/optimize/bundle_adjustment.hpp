@@ -7,6 +7,7 @@
 
 #include "base/pose.hpp"
 #include "camera/camera.hpp"
+#include "inertial/preintegration.hpp"
 
 namespace orbslam {
 
@@ -26,9 +27,31 @@ struct BundleProblem {
     float right_factor = 1;  ///< inverse variance of the right column over that of u and v
     bool has_depth = false;
   };
+  /// What an IMU beside a camera had, besides its pose.
+  struct Motion {
+    std::uint32_t camera = 0;
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< in the world [m/s]
+    ImuBias bias;
+    /// Of the bias before (gyro, accelerometer): the inverse variances.
+    Vector6d bias_information = Vector6d::Zero();
+    bool fixed = false;
+  };
+  /// Samples from one motion to another.
+  struct ImuLink {
+    std::uint32_t first = 0, second = 0;
+    std::shared_ptr<const Preintegration> motion;
+  };
+  /// Empty without an IMU. With the solver of blocks only.
+  struct Inertial {
+    std::vector<Motion> motions;
+    std::vector<ImuLink> links;
+    Pose T_cb;                                           ///< from the IMU to the camera
+    Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< of free fall in the world [m/s^2]
+  };
   std::vector<Camera> cameras;
   std::vector<Eigen::Vector3d> points;
   std::vector<Observation> observations;
+  Inertial inertial;
 };
 
 /// kBlocks is our own: blocks of fixed size, four lanes at once, the same bytes with any number of

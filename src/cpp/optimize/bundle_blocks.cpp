@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Levenberg-Marquardt over blocks of fixed size. See docs/method/adjustment.md#blocks.
 #include <algorithm>
+#include <Eigen/Cholesky>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -11,6 +13,7 @@
 #include "optimize/block_bundle.hpp"
 #include "optimize/bundle_minimiser.hpp"
 #include "optimize/gates.hpp"
+#include "optimize/inertial_system.hpp"
 
 namespace orbslam {
 namespace {
@@ -65,6 +68,7 @@ class BlockMinimiser final : public BundleMinimiser {
     w_.bundle.build(problem, usable);
     copy_estimate();
     make_room();
+    if (!problem.inertial.links.empty()) inertial_.emplace(problem, w_.bundle.free_cameras());
     if (options.n_threads > 1) pair_.emplace();
   }
 
@@ -82,6 +86,7 @@ class BlockMinimiser final : public BundleMinimiser {
         equal ? kInitialDamping * std::max(1.0, largest_curvature()) : 1 / kInitialTrustRadius;
     double growth = 2;
     cost_ = cost_at(w_.views, w_.points);
+    if (inertial_) cost_ += inertial_->cost(free_poses(w_.poses), false);
     rule.start(cost_);
     bool done = false, aborted = false;
     for (int trial = 0; !done && !aborted && !summary.timed_out && trial < 2 * stage.iterations;
@@ -237,6 +242,49 @@ class BlockMinimiser final : public BundleMinimiser {
     return damping_ * (scaled_ ? std::clamp(curvature, kLeastCurvature, kMostCurvature) : 1.0);
   }
 
+  std::vector<Pose> free_poses(const std::vector<Pose>& poses) const {
+    return {poses.begin(), poses.begin() + static_cast<std::ptrdiff_t>(w_.bundle.n_free())};
+  }
+
+  /// Solves the assembled system of the cameras together with the inertial residuals. Returns their
+  /// part of the predicted decrease; NaN if there is no solution.
+  double solve_with_imu() {
+    const Eigen::Index size = inertial_->n_unknowns(), of_cameras = inertial_->n_camera_unknowns();
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(size);
+    inertial_->linearise(free_poses(w_.poses), H, b);
+    Eigen::VectorXd damping = Eigen::VectorXd::Zero(size);
+    for (Eigen::Index k = 0; k < size; ++k) {
+      // Cameras are damped by what images tell of them, in assemble().
+      if (k >= of_cameras) damping(k) = damping_of(H(k, k));
+      H(k, k) += damping(k);
+    }
+    const Eigen::VectorXd gradient = b;
+    const std::size_t n = w_.bundle.n_free();
+    const double* block = w_.sums[0].blocks.data();
+    for (std::size_t j = 0; j < n; ++j) {
+      for (std::size_t i = j; i < n; ++i, block += kBlockSize) {
+        const Eigen::Map<const Matrix6d> values(block);
+        auto target = H.block<6, 6>(static_cast<Eigen::Index>(6 * i),
+                                    static_cast<Eigen::Index>(6 * j));
+        if (i == j) {
+          target.triangularView<Eigen::Lower>() += values;
+        } else {
+          target += values;
+        }
+      }
+    }
+    b.head(of_cameras) += Eigen::Map<const Eigen::VectorXd>(w_.solution.data(), of_cameras);
+    const Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> factor(H);
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    if (factor.info() != Eigen::Success) return kNone;
+    const Eigen::VectorXd step = factor.solve(b);
+    if (!step.allFinite()) return kNone;
+    std::copy_n(step.data(), of_cameras, w_.solution.data());
+    inertial_->move(step);
+    return step.dot(damping.cwiseProduct(step) + gradient);
+  }
+
   /// Moves free cameras by the solution. Returns their part of the predicted decrease.
   double move_cameras() {
     double predicted = 0;
@@ -266,15 +314,22 @@ class BlockMinimiser final : public BundleMinimiser {
     predicted_ = -1;
     const auto n = static_cast<bundle_kernels::Index>(w_.bundle.n_free());
     double* blocks = w_.sums[0].blocks.data();
-    if (!kernels_.factorise(blocks, n, w_.factor_scratch.data())) return 0;
-    kernels_.solve(blocks, n, w_.solution.data());
-    predicted_ = move_cameras();
+    double of_imu = 0;
+    if (inertial_) {
+      of_imu = solve_with_imu();
+      if (std::isnan(of_imu)) return 0;
+    } else {
+      if (!kernels_.factorise(blocks, n, w_.factor_scratch.data())) return 0;
+      kernels_.solve(blocks, n, w_.solution.data());
+    }
+    predicted_ = move_cameras() + of_imu;
     std::array<double, BlockBundle::kTasks> parts{};
     for_each_task([&](std::size_t number) {
       parts[number] = kernels_.back_substitute(task(number, w_.views, w_.points));
     });
     predicted_ += parts[0] + parts[1];
     moved_cost_ = cost_at(w_.moved_views, w_.moved_points);
+    if (inertial_) moved_cost_ += inertial_->cost(free_poses(w_.moved_poses), true);
     const double gain = (cost_ - moved_cost_) / predicted_;
     return predicted_ > 0 && std::isfinite(gain) ? gain : 0;
   }
@@ -283,10 +338,12 @@ class BlockMinimiser final : public BundleMinimiser {
     std::swap(w_.poses, w_.moved_poses);
     std::swap(w_.views, w_.moved_views);
     std::swap(w_.points, w_.moved_points);
+    if (inertial_) inertial_->accept();
     cost_ = moved_cost_;
   }
 
   void write_estimate() {
+    if (inertial_) inertial_->write(problem_);
     for (std::size_t i = 0; i < w_.bundle.n_free(); ++i) {
       problem_.cameras[w_.bundle.free_cameras()[i]].T_cw = w_.poses[i];
     }
@@ -304,6 +361,7 @@ class BlockMinimiser final : public BundleMinimiser {
   double damping_ = 0, cost_ = 0, moved_cost_ = 0;
   double predicted_ = -1;  // of the last step; negative: none was found
   std::optional<TaskPair> pair_;
+  std::optional<InertialSystem> inertial_;
 };
 
 }  // namespace

@@ -10,10 +10,15 @@
 namespace orbslam {
 namespace {
 
-/// The keyframe and its neighbours, by id.
-std::vector<KeyFrameId> local_keyframes(const Map& map, const KeyFrame& current) {
+// Newest keyframes in time that are local with an IMU.
+constexpr std::size_t kInTime = 10;
+
+/// The keyframe, its neighbours and others, by id.
+std::vector<KeyFrameId> local_keyframes(const Map& map, const KeyFrame& current,
+                                        const std::vector<KeyFrameId>& in_time) {
   std::vector<KeyFrameId> ids = current.neighbours;
   ids.push_back(current.id);
+  ids.insert(ids.end(), in_time.begin(), in_time.end());
   sort_unique(ids);
   ids.erase(std::remove_if(ids.begin(), ids.end(),
                            [&](KeyFrameId id) { return map.find(id) == nullptr; }),
@@ -98,22 +103,35 @@ class ScaleGauge {
   double size_ = 0;  ///< 0: the scale is fixed, or measured
 };
 
-GatheredBundle gather(const Map& map, KeyFrameId current, LocalBundleResult& result) {
+GatheredBundle gather(const Map& map, KeyFrameId current, const InertialKeyframes* inertial,
+                      LocalBundleResult& result) {
   const auto lock = map.read_lock();
   GatheredBundle bundle(map);
   const KeyFrame* keyframe = map.find(current);
   if (keyframe == nullptr) return bundle;
-  const std::vector<KeyFrameId> local = local_keyframes(map, *keyframe);
+  std::vector<KeyFrameId> in_time;
+  if (inertial != nullptr) in_time = inertial->newest(map, keyframe->map, kInTime + 1);
+  // The oldest one holds the chain: it is fixed, and local only if it shares points.
+  const std::vector<KeyFrameId> chain = in_time;
+  KeyFrameId held;
+  if (in_time.size() > kInTime) {
+    held = in_time.front();
+    in_time.erase(in_time.begin());
+  }
+  const std::vector<KeyFrameId> local = local_keyframes(map, *keyframe, in_time);
   const std::vector<const MapPoint*> points = local_points(map, local);
   for (const KeyFrameId id : local) {
     const KeyFrame& camera = *map.find(id);
-    bundle.add_camera(camera, map.is_root(camera));
+    bundle.add_camera(camera, map.is_root(camera) || id == held);
   }
   for (const KeyFrameId id : outer_keyframes(points, local)) {
     bundle.add_camera(*map.find(id), true);
   }
+  if (held.valid() && bundle.camera_of.count(held) == 0) bundle.add_camera(*map.find(held), true);
   bundle.add_points(points, map);
   fix_gauge(bundle);
+  if (chain.size() > 1) inertial->add_to(bundle, chain, map);
+  result.n_imu_links = static_cast<int>(bundle.problem.inertial.links.size());
   result.n_local_keyframes = static_cast<int>(local.size());
   result.n_fixed_keyframes = bundle.n_fixed();
   result.n_points = static_cast<int>(bundle.points.size());
@@ -125,18 +143,19 @@ GatheredBundle gather(const Map& map, KeyFrameId current, LocalBundleResult& res
 
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular,
-                                          int n_threads, BundleSolver solver) {
+                                          int n_threads, BundleSolver solver,
+                                          InertialKeyframes* inertial) {
   LocalBundleResult result;
   if (abort != nullptr && abort->load()) {
     result.summary.aborted = true;
     return result;
   }
-  GatheredBundle bundle = gather(map, current, result);
+  GatheredBundle bundle = gather(map, current, inertial, result);
   if (bundle.problem.observations.empty()) return result;
   BundleOptions options;
   options.n_threads = n_threads;
   options.solver = solver;
-  const ScaleGauge scale(bundle, monocular);
+  const ScaleGauge scale(bundle, monocular && result.n_imu_links == 0);
   result.summary = solve_bundle(bundle.problem, options, abort);
   // Every accepted step lowers the cost; without one there is nothing to write.
   const bool moved = result.summary.iterations > 0;
@@ -150,6 +169,7 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
     result.n_erased = erase_observations(bundle, result.summary.outlier, map);
   }
   if (moved) write_back(bundle, map);
+  if (moved && inertial != nullptr) inertial->take_from(bundle, map);
   result.committed = true;
   return result;
 }

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "map/map.hpp"
+#include "optimize/inertial_keyframes.hpp"
 #include "optimize/bundle_adjustment.hpp"
 
 namespace orbslam {
@@ -12,6 +13,7 @@ struct LocalBundleResult {
   int n_local_keyframes = 0;  ///< `current` and its neighbours
   int n_fixed_keyframes = 0;  ///< cameras held still, local or not
   int n_points = 0, n_observations = 0;
+  int n_imu_links = 0;     ///< residuals of the IMU
   int n_erased = 0;        ///< observations removed as outliers
   bool committed = false;  ///< the map was changed
   BundleSummary summary;
@@ -27,11 +29,13 @@ struct LocalBundleResult {
 /// keyframe. With a single camera and one fixed pose the scale is kept as well: the distances of
 /// the others from that one have the same sum as before. `abort` is polled once per iteration;
 /// nullptr: never. After an abort the progress is written; observations are erased only if the
-/// first stage was finished. See docs/method/mapping.md#local-bundle-adjustment and
+/// first stage was finished. With `inertial` the newest keyframes in time that have a state of the
+/// IMU are local, too, with residuals of the IMU between them; the scale is then no gauge. See docs/method/mapping.md#local-bundle-adjustment and
 /// docs/method/adjustment.md#local-bundle-adjustment.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
                                           int n_threads = 1,
-                                          BundleSolver solver = BundleOptions().solver);
+                                          BundleSolver solver = BundleOptions().solver,
+                                          InertialKeyframes* inertial = nullptr);
 
 }  // namespace orbslam

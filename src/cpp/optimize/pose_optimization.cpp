@@ -26,8 +26,10 @@ constexpr int kFewObservations = 10;  // below: one round only
 struct Workspace {
   Group mono, stereo;
   std::vector<double> used_mono, used_stereo;  ///< weights of the last round
+  const PosePrior* prior = nullptr;
 
   void clear() {
+    prior = nullptr;
     mono.clear();
     stereo.clear();
     used_mono.clear();
@@ -63,10 +65,36 @@ Workspace& workspace() {
   return instance;
 }
 
+/// The matrix ad(xi) of a tangent (rotation, translation): the product of two tangents.
+Matrix6d product_matrix(const Vector6d& xi) {
+  Matrix6d ad = Matrix6d::Zero();
+  ad.topLeftCorner<3, 3>() = ad.bottomRightCorner<3, 3>() = skew(xi.head<3>());
+  ad.bottomLeftCorner<3, 3>() = skew(xi.tail<3>());
+  return ad;
+}
+
+/// Squared error of a pose by its prior.
+double accumulate_prior(const PosePrior& prior, const Pose& T_cw, NormalEquations* equations) {
+  const Vector6d error = (T_cw * prior.mean.inverse()).log();
+  const Vector6d weighted = prior.information * error;
+  if (equations != nullptr) {
+    // Of the logarithm by a left perturbation, to second order.
+    const Matrix6d ad = product_matrix(error);
+    const Matrix6d ad2 = ad * ad;
+    const Matrix6d J = Matrix6d::Identity() - 0.5 * ad + ad2 / 12;
+    const Matrix6d weighted_J = prior.information * J;
+    equations->H += J.transpose() * weighted_J;
+    equations->b -= J.transpose() * weighted;
+  }
+  return error.dot(weighted);
+}
+
 double evaluate(const Workspace& w, const Camera& camera, const Pose& T_cw, bool robust,
                 NormalEquations* equations) {
   if (equations != nullptr) *equations = NormalEquations();
-  return accumulate_mono(w.mono, camera, T_cw, robust ? kHuberMono : 0.0, equations) +
+  const double of_prior =
+      w.prior != nullptr ? accumulate_prior(*w.prior, T_cw, equations) : 0.0;
+  return of_prior + accumulate_mono(w.mono, camera, T_cw, robust ? kHuberMono : 0.0, equations) +
          accumulate_stereo(w.stereo, camera, T_cw, robust ? kHuberStereo : 0.0, equations);
 }
 
@@ -169,23 +197,45 @@ void leave_out_hidden(Group& group, const Camera& camera, const Pose& T_cw) {
   }
 }
 
-/// Inverse of the normal matrix of the observations in use, for residuals with a variance of 1;
-/// zero when undetermined. `cost` becomes their sum of squares.
-Matrix6d unit_covariance(const Workspace& w, const Camera& camera, const Pose& T_cw, double& cost) {
-  NormalEquations equations;
-  cost = evaluate(w, camera, T_cw, false, &equations);
-  const Eigen::LLT<Matrix6d> factor(equations.H);
+/// Zero when the matrix is not positive definite.
+Matrix6d inverse_of(const Matrix6d& H) {
+  const Eigen::LLT<Matrix6d> factor(H);
   if (factor.info() != Eigen::Success) return Matrix6d::Zero();
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
   if (!inverse.allFinite()) return Matrix6d::Zero();
   return 0.5 * (inverse + inverse.transpose());
 }
 
-/// The same times the variance that the inliers' residuals have.
-Matrix6d covariance(const Workspace& w, const Camera& camera, const Pose& T_cw) {
+/// Inverse of the normal matrix of the observations in use, for residuals with a variance of 1;
+/// zero when undetermined. `cost` becomes their sum of squares.
+Matrix6d unit_covariance(const Workspace& w, const Camera& camera, const Pose& T_cw, double& cost) {
+  NormalEquations equations;
+  cost = evaluate(w, camera, T_cw, false, &equations);
+  return inverse_of(equations.H);
+}
+
+int count_residuals(const Workspace& w) {
   int n_residuals = 0;
   for (const double weight : w.mono.weight) n_residuals += weight > 0 ? 2 : 0;
   for (const double weight : w.stereo.weight) n_residuals += weight > 0 ? 3 : 0;
+  return n_residuals;
+}
+
+/// Covariance of observations and prior together. The variance of the residuals counts where it is
+/// above 1: the prior must not lend its certainty to a wrong image.
+Matrix6d covariance_with_prior(const Workspace& w, const Camera& camera, const Pose& T_cw) {
+  NormalEquations images;
+  const double cost = accumulate_mono(w.mono, camera, T_cw, 0.0, &images) +
+                      accumulate_stereo(w.stereo, camera, T_cw, 0.0, &images);
+  const int n_residuals = count_residuals(w);
+  const double variance = n_residuals > 6 ? std::max(1.0, cost / (n_residuals - 6)) : 1.0;
+  return inverse_of(images.H / variance + w.prior->information);
+}
+
+/// The same times the variance that the inliers' residuals have.
+Matrix6d covariance(const Workspace& w, const Camera& camera, const Pose& T_cw) {
+  if (w.prior != nullptr) return covariance_with_prior(w, camera, T_cw);
+  const int n_residuals = count_residuals(w);
   if (n_residuals <= 6) return Matrix6d::Zero();
   double cost = 0;
   const Matrix6d unit = unit_covariance(w, camera, T_cw, cost);
@@ -198,7 +248,12 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
                 PoseEstimate& estimate, std::uint8_t* outlier) {
   estimate.T_cw = T_cw_initial;
   const int n_observations = w.size();
-  if (n_observations < kMinObservations) return;
+  if (n_observations < kMinObservations) {
+    if (w.prior == nullptr) return;
+    estimate.T_cw = w.prior->mean;
+    estimate.covariance = inverse_of(w.prior->information);
+    return;
+  }
   w.mono.pad();
   w.stereo.pad();
   for (int round = 0; round < kRounds; ++round) {
@@ -211,7 +266,8 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
     estimate.T_cw = T_cw;
     estimate.n_inliers = classify(w.mono, false, camera, T_cw, outlier) +
                          classify(w.stereo, true, camera, T_cw, outlier);
-    if (n_observations < kFewObservations || estimate.n_inliers < kMinObservations) break;
+    const bool few = n_observations < kFewObservations || estimate.n_inliers < kMinObservations;
+    if (few && w.prior == nullptr) break;
   }
   estimate.covariance = covariance(w, camera, estimate.T_cw);
 }
@@ -227,9 +283,11 @@ bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
 }  // namespace
 
 PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
-                           const std::vector<PoseObservation>& observations) {
+                           const std::vector<PoseObservation>& observations,
+                           const PosePrior* prior) {
   Workspace& w = workspace();
   w.clear();
+  w.prior = prior;
   PoseEstimate estimate;
   estimate.outlier.resize(observations.size());
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -242,13 +300,14 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
   return estimate;
 }
 
-PoseEstimate optimize_pose(TrackedFrame& frame) {
+PoseEstimate optimize_pose(TrackedFrame& frame, const PosePrior* prior) {
   if (!frame.T_cw) {
     throw StateError("optimize_pose: the frame has no pose to start from; set T_cw first");
   }
   const Frame& f = *frame.frame;
   Workspace& w = workspace();
   w.clear();
+  w.prior = prior;
   for (std::size_t i = 0; i < f.size(); ++i) {
     frame.outlier[i] = 0;
     if (!frame.map_points[i].valid()) continue;

@@ -17,12 +17,18 @@ struct PoseObservation {
   bool has_depth = false;
 };
 
+/// Gaussian of a pose: `T_cw = exp(e) mean` with `e` (rotation, translation) of mean zero.
+struct PosePrior {
+  Pose mean;                                 ///< T_cw
+  Matrix6d information = Matrix6d::Zero();   ///< inverse of the covariance of `e`
+};
+
 struct PoseEstimate {
   Pose T_cw;
   int n_inliers = 0;
   std::vector<std::uint8_t> outlier;  ///< per observation
   /// Covariance of T_cw in the tangent order (rotation, translation), left perturbation, scaled by
-  /// the residual variance; zero when nothing was estimated.
+  /// the residual variance; zero when nothing was estimated. With a prior: of both together.
   Matrix6d covariance = Matrix6d::Zero();
   int iterations = 0;
 };
@@ -34,13 +40,17 @@ struct PoseEstimate {
 /// than 3 inliers left: no further round. Fewer than 3 observations: returned unchanged, 0 inliers.
 /// Observations with NaN or infinite numbers are outliers and take no part. See
 /// docs/method/adjustment.md#pose-of-a-frame.
+///
+/// A prior is one more residual without kernel, which no round leaves out. Any number of
+/// observations is enough with it; with fewer than 3 the prior alone is the result.
 PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
-                           const std::vector<PoseObservation>& observations);
+                           const std::vector<PoseObservation>& observations,
+                           const PosePrior* prior = nullptr);
 
 /// The same for a frame's associations: starts from its pose, and writes its pose and outlier flags
 /// (of all slots; those without a point get 0). `outlier` of the result stays empty, so that calls
 /// after a thread's first do not allocate. Throws StateError when the frame has no pose.
-PoseEstimate optimize_pose(TrackedFrame& frame);
+PoseEstimate optimize_pose(TrackedFrame& frame, const PosePrior* prior = nullptr);
 
 /// Covariance (rotation, translation; left perturbation) of the pose that a frame has, for
 /// associations that are off by as much as their keypoints are taken for: a frame whose keypoints

@@ -63,6 +63,8 @@ class LocalMapping:
         )
         self._adjustment_threads = adjustment_threads
         self._adjusted_keyframes = limits.adjusted_keyframes
+        #: Velocities and biases at keyframes, once an IMU has started.
+        self.inertial: core.InertialKeyframes | None = None
         #: Milliseconds per part of the work, over all keyframes.
         self.statistics = StageStatistics()
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
@@ -119,6 +121,7 @@ class LocalMapping:
                     self.worker.interrupt_flag,
                     self._monocular,
                     self._adjustment_threads,
+                    inertial=self.inertial,
                 )
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)

@@ -31,7 +31,7 @@ from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingL
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.inertial import InertialInput
+from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput, InertialTracker
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
@@ -104,7 +104,9 @@ class Pipeline:
             setup.settings, sensor, check_calibration=options.check_calibration
         )
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
-        self.tracking = _make_tracking(setup, back_end, options, config)
+        #: Uses the IMU in tracking; None without settings of one.
+        self.inertial_tracker = _make_inertial(setup, back_end)
+        self.tracking = _make_tracking(setup, back_end, options, config, self.inertial_tracker)
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(
             setup.imu, back_end.events.worker.offer if in_time else _at_once
@@ -204,9 +206,13 @@ class Pipeline:
             self._next_frame_id += 1
             self._last_timestamp = timestamp
             # The samples of the IMU from the image before to this one; None without an IMU.
-            interval = self.inertial.take(timestamp)
+            interval = self._take_samples(timestamp)
             outcome = tracking.track(
-                frame, timer, localize=self.localization.on, details=details or bool(watchers)
+                frame,
+                timer,
+                localize=self.localization.on,
+                details=details or bool(watchers),
+                interval=interval,
             )
         self.statistics.add(timer.milliseconds)
 
@@ -270,6 +276,13 @@ class Pipeline:
         if n_young > 0 and (settled or n_young >= _YOUNG_FRAMES):
             self.recorder.reestimate_first_frames()
 
+    def _take_samples(self, timestamp: float) -> ImuInterval | None:
+        """Take the samples since the image before, and whether the IMU may be used."""
+        check, tracker = self.inertial.check, self.inertial_tracker
+        if check is not None and tracker is not None:
+            tracker.allowed = check.verdict is not ImuVerdict.HELD_BACK
+        return self.inertial.take(timestamp)
+
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingResult) -> None:
         if outcome.given_up is not None:
             self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
@@ -315,6 +328,8 @@ class Pipeline:
             milliseconds=timer.milliseconds,
             features=frame_features(frame, outcome.inliers) if details else None,
             evidence=estimate.evidence,
+            method=estimate.method if ok and not outcome.begins_map else None,
+            inertial=None if self.inertial_tracker is None else self.inertial_tracker.record(),
         )
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
@@ -389,11 +404,37 @@ def _at_once(work: Callable[[], None]) -> None:
 def _make_search(
     setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
 ) -> PoseSearch:
-    return PoseSearch(back_end.map, setup.vocabulary, setup.sensor, relocalizer, config.tracking)
+    return PoseSearch(
+        back_end.map,
+        setup.vocabulary,
+        setup.sensor,
+        relocalizer,
+        config.tracking,
+        pixels_per_radian=setup.settings.camera.pixels_per_radian,
+    )
+
+
+def _make_inertial(setup: Setup, back_end: BackEnd) -> InertialTracker | None:
+    """The tracker of an IMU; None without settings of one."""
+    if setup.imu is None:
+        return None
+    workers = back_end.map_workers
+    tracker = InertialTracker(
+        back_end.map,
+        setup.imu,
+        metric=setup.sensor.has_depth,
+        idle=lambda: all(worker.idle for worker in workers),
+    )
+    back_end.mapping.inertial = tracker.keyframes
+    return tracker
 
 
 def _make_tracking(
-    setup: Setup, back_end: BackEnd, options: SystemOptions, config: Config
+    setup: Setup,
+    back_end: BackEnd,
+    options: SystemOptions,
+    config: Config,
+    inertial: InertialTracker | None,
 ) -> Tracking:
     seed = options.seed
     sensor, vocabulary = setup.sensor, setup.vocabulary
@@ -453,4 +494,5 @@ def _make_tracking(
         config=config,
         has_depth=sensor.has_depth,
         new_map_after=options.new_map_after if options.several_maps else None,
+        inertial=inertial,
     )

@@ -75,6 +75,9 @@ class PoseMethod(str, enum.Enum):
     KEYFRAMES_AROUND = "keyframes around"
     WIDE_WINDOW = "wide window"
     ALL_KEYPOINTS = "all keypoints"
+    NEAR_PREDICTION = "near prediction"
+    #: Predicted by the IMU; no image supports it.
+    IMU = "imu"
 
     def __str__(self) -> str:
         return self.value
@@ -197,6 +200,9 @@ class TrackingRecord(EqualByValue):
     evidence: Evidence | None = None
     """What speaks for the pose, or, if the reason is `Reason.WEAK_EVIDENCE`, spoke against it; None
     where no pose was found, and in the frame that begins a map."""
+    method: PoseMethod | None = None
+    """What found the pose; `PoseMethod.IMU`: the IMU alone, for the image shows too little. None
+    without a pose, and in the frame that begins a map."""
     inertial: InertialState | None = None
     """Velocity and biases; None where the IMU is not used."""
 
@@ -256,6 +262,8 @@ class PoseEstimate:
     """What found it."""
     evidence: Evidence | None = None
     """See `TrackingRecord.evidence`."""
+    by_image: core.Pose | None = None
+    """``T_cw`` by the image alone, where the pose is that of image and IMU together."""
     unconfirmed: bool = False
     """Found again, and not yet confirmed by the next frame."""
 
@@ -282,3 +290,5 @@ class TrackingResult:
     """Frames before this one that have found their poses now that there is a map, in order."""
     inliers: npt.NDArray[np.bool_] | None = None
     """(n,) keypoints that the pose was accepted with; None unless details were asked for."""
+    begins_map: bool = False
+    """The frame is the first one of a map."""

@@ -18,6 +18,7 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.config import Config
+from orbslam2py.slam.inertial import ImuInterval, InertialTracker
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
@@ -26,7 +27,13 @@ from orbslam2py.slam.pose_search import (
     estimate_in_fixed_map,
     estimate_in_growing_map,
 )
-from orbslam2py.slam.records import PoseEstimate, Reason, TrackingResult, TrackingState
+from orbslam2py.slam.records import (
+    PoseEstimate,
+    PoseMethod,
+    Reason,
+    TrackingResult,
+    TrackingState,
+)
 from orbslam2py.slam.state import Motion, State
 from orbslam2py.slam.state.transitions import (
     ActivateMap,
@@ -74,6 +81,8 @@ class Tracking:
     new_map_after : float or None
         Seconds that tracking is lost before another map begins beside those there are; None: only
         the old one is searched, for ever.
+    inertial : InertialTracker or None
+        Predicts poses by an IMU.
     """
 
     def __init__(
@@ -89,6 +98,7 @@ class Tracking:
         config: Config,
         has_depth: bool,
         new_map_after: float | None = None,
+        inertial: InertialTracker | None = None,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
@@ -98,6 +108,7 @@ class Tracking:
         self._acceptance = acceptance
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
+        self._inertial = inertial
         self._transitions = Transitions(config, new_map_after=new_map_after)
         self._state = State()
 
@@ -203,6 +214,7 @@ class Tracking:
         *,
         localize: bool = False,
         details: bool = False,
+        interval: ImuInterval | None = None,
     ) -> TrackingResult:
         """Find the frame's pose; make it a keyframe if the map needs one.
 
@@ -219,7 +231,11 @@ class Tracking:
             Pose only: no keyframes, no new points.
         details : bool
             The outcome is to say which keypoints the pose was accepted with.
+        interval : ImuInterval or None
+            Samples of the IMU since the frame before.
         """
+        if self._inertial is not None:
+            self._state = self._inertial.predict(interval, self._state)
         if self._state.initializing:
             self._apply(NotInitialized())
             return self._begin_map(frame, timer)
@@ -228,14 +244,20 @@ class Tracking:
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found and self._transitions.is_contradicted(self._state, frame):
             estimate = estimate.failed(Reason.NOT_CONFIRMED)
+        if self._inertial is not None and self._state.phase is TrackingState.OK:
+            estimate = self._inertial.judge(frame, estimate, self._state.motion)
+            if estimate.method is PoseMethod.IMU:
+                return TrackingResult(self._state.phase, estimate)
         if not estimate.found:
             begun = self._begin_map_beside(frame, timer, localize=localize)
             return begun or self._lose(frame, estimate)
-        if self._state.is_lost:
+        if self._state.is_lost or estimate.unconfirmed:
             estimate = replace(estimate, unconfirmed=True)
             self._apply(Relocalized(frame, estimate.n_inliers))
         else:
             self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
+        if self._inertial is not None:
+            self._inertial.tracked(frame, estimate)
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
         is_keyframe = False
@@ -310,7 +332,9 @@ class Tracking:
         # Its pose is the origin, but its keypoints, which became points, have errors.
         covariance = core.pose_covariance(frame)
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
-        return TrackingResult(self._state.phase, estimate, is_keyframe=True, earlier=earlier)
+        return TrackingResult(
+            self._state.phase, estimate, is_keyframe=True, earlier=earlier, begins_map=True
+        )
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingResult:
         if not self._state.is_lost:
@@ -353,6 +377,8 @@ class Tracking:
             # Bundle adjustment, which tries them again, would have few inliers to tell them by.
             frame.discard_outliers()
         self._create_keyframe(frame)
+        if self._inertial is not None:
+            self._inertial.keyframe_made(self._state.since_keyframe.keyframe, frame)
         return True
 
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:

@@ -4,5 +4,13 @@
 from orbslam2py.slam.inertial.imu_buffer import ImuBuffer, ImuInterval
 from orbslam2py.slam.inertial.imu_check import ImuCheck, ImuVerdict
 from orbslam2py.slam.inertial.inertial_input import InertialInput
+from orbslam2py.slam.inertial.inertial_tracker import InertialTracker
 
-__all__ = ["ImuBuffer", "ImuCheck", "ImuInterval", "ImuVerdict", "InertialInput"]
+__all__ = [
+    "ImuBuffer",
+    "ImuCheck",
+    "ImuInterval",
+    "ImuVerdict",
+    "InertialInput",
+    "InertialTracker",
+]

@@ -49,6 +49,8 @@ def estimate_in_growing_map(
         if estimate.found:
             return estimate, state
     estimate = search.by_keyframes(frame, state)
+    if state.motion.prediction_covariance is not None and not estimate.found:
+        estimate = search.near_prediction(frame, state)
     if estimate.found:
         return estimate, state
     if state.is_lost:

@@ -19,6 +19,7 @@ from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.state import State
 
 _AFRESH_WINDOW = 3.0  # factor on the search radius, for a pose that may be off by more than usual
+_KEPT = 0.95  # share of the inliers that a pose must keep with the prediction of an IMU
 _ELSEWHERE = 3.0  # standard deviations: 99 % of two poses of one camera are nearer
 
 
@@ -101,6 +102,7 @@ class LocalMapSearch:
             window = self._limits.local_map_window_after_relocalization
         matches = core.match_local_map(frame, local_map.points, first.discarded, window)
         optimized = core.optimize_pose(frame)
+        by_image, fused = frame.T_cw, _fused(frame, optimized, state)
         visible = matches.visible
         found_again = just_begun and state.found_again
         if found_again and optimized.n_inliers >= self._limits.map_matches:
@@ -108,7 +110,9 @@ class LocalMapSearch:
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
-        estimate = self._enough_found(frame, first, optimized)
+        estimate = self._enough_found(frame, first, fused or optimized)
+        if fused is not None:
+            estimate = replace(estimate, by_image=by_image)
         if estimate.visual_odometry:
             return _beyond_the_map(frame, estimate, state)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
@@ -177,6 +181,22 @@ class LocalMapSearch:
             # What the frame before measured speaks for itself, and says nothing of the map.
             return replace(estimate, visual_odometry=True)
         return estimate
+
+
+def _fused(
+    frame: core.TrackedFrame, optimized: core.PoseEstimate, state: State
+) -> core.PoseEstimate | None:
+    """Optimize a pose again with the prediction of an IMU, unless that costs inliers."""
+    prior = state.motion.prior()
+    if prior is None:
+        return None
+    T_cw = frame.T_cw
+    fused = core.optimize_pose(frame, prior)
+    if fused.n_inliers >= _KEPT * optimized.n_inliers:
+        return fused
+    frame.T_cw = T_cw
+    core.optimize_pose(frame)
+    return None
 
 
 def _beyond_the_map(frame: core.TrackedFrame, odometry: PoseEstimate, state: State) -> RefinedPose:

@@ -16,6 +16,8 @@ from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.state import Motion, State
 
+_WIDEST = 60.0  # half width of the search window around the prediction of an IMU, pixels
+
 
 class PoseSearch:
     """Finds a frame's pose from the last frame, a keyframe, the whole map or the local map.
@@ -32,6 +34,8 @@ class PoseSearch:
         Finds lost frames in the map; without it none is found there.
     config : TrackingConfig
         Limits.
+    pixels_per_radian : float
+        Of the camera: the search window follows the covariance of an IMU.
 
     Attributes
     ----------
@@ -52,8 +56,11 @@ class PoseSearch:
         sensor: Sensor,
         relocalizer: Relocalizer | None,
         config: TrackingConfig,
+        *,
+        pixels_per_radian: float = 0.0,
     ) -> None:
         self.map = slam_map
+        self._pixels_per_radian = pixels_per_radian
         self._vocabulary = vocabulary
         self._sensor = sensor
         self.has_depth = sensor.has_depth
@@ -87,7 +94,8 @@ class PoseSearch:
         motion.predict(frame)
         if beyond_the_map:
             core.add_temporary_points(motion.last, motion.last_points)
-        return self.around_prediction(frame, motion, self.motion_model_window)
+        of_imu = min(_WIDEST, 3 * self._pixels_per_radian * motion.deviation_in_image())
+        return self.around_prediction(frame, motion, max(self.motion_model_window, of_imu))
 
     def around_prediction(
         self, frame: core.TrackedFrame, motion: Motion, narrow: float
@@ -148,6 +156,24 @@ class PoseSearch:
             return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_best)
         estimate = self._optimize(frame, n_best, Reason.FEW_INLIERS_REFERENCE)
         return replace(estimate, method=PoseMethod.REFERENCE_KEYFRAME)
+
+    def near_prediction(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
+        """From the points of the map around the pose that an IMU predicts.
+
+        After some seconds without an image the camera sees other points than the last frame.
+        """
+        failed = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
+        prior = state.motion.prior()
+        if prior is None or self._relocalizer is None:
+            return failed
+        n_inliers = self._relocalizer.relocalize_near(frame, prior.mean)
+        if n_inliers == 0:
+            return failed
+        keyframe = self._some_keyframe_around(frame, state.reference_keyframe)
+        core.anchor_frame(self.map, frame, keyframe)
+        return PoseEstimate(
+            n_matches=n_inliers, n_inliers=n_inliers, method=PoseMethod.NEAR_PREDICTION
+        )
 
     def by_all_keypoints(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         """From the reference keyframe's points, each compared with every keypoint of the frame.

@@ -6,6 +6,7 @@ Mur-Artal, Montiel and Tardos, 2015, section V-B; ``docs/method/tracking.md``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,6 +31,8 @@ class Motion:
     """Copies of the points that the last frame saw, as of the last `following`."""
     is_tracked: bool = False
     """The next frame follows the last one: the camera was not lost in between."""
+    prediction_covariance: FloatArray | None = None
+    """(6, 6), of the next pose as `velocity` predicts it, by an IMU; None without one."""
     map_motion: core.Pose | None = None
     """Motion of the map under the last frame since it was tracked, by local bundle adjustment."""
 
@@ -46,6 +49,31 @@ class Motion:
         assert T_lw is not None
         frame.T_cw = T_lw if self.velocity is None else self.velocity @ T_lw
         frame.share_anchor(self.last)
+
+    def prior(self) -> core.PosePrior | None:
+        """Return the predicted pose with its information, where an IMU predicts it."""
+        T_lw = None if self.last_frame is None else self.last_frame.T_cw
+        if self.prediction_covariance is None or self.velocity is None or T_lw is None:
+            return None
+        return core.PosePrior(self.velocity @ T_lw, np.linalg.inv(self.prediction_covariance))
+
+    def median_depth(self) -> float:
+        """Return the median depth of the points that the last frame saw; 1 without points."""
+        T_lw = None if self.last_frame is None else self.last_frame.T_cw
+        if T_lw is None or not len(self.last_points):
+            return 1.0
+        depths = (T_lw @ np.ascontiguousarray(self.last_points.positions))[:, 2]
+        return max(1e-6, float(np.median(depths)))
+
+    def deviation_in_image(self) -> float:
+        """Return the standard deviation [rad] of the directions of predicted points, by an IMU.
+
+        It is that of points at the median depth of those that the last frame saw; 0 without an IMU.
+        """
+        if self.prediction_covariance is None:
+            return 0.0
+        variances = np.diag(self.prediction_covariance)
+        return math.sqrt(variances[:3].max() + variances[3:].max() / self.median_depth() ** 2)
 
     def predict_turned(self, frame: core.TrackedFrame, quaternion_xyzw: FloatArray) -> None:
         """Set the pose of a frame by the translation of the velocity and a given rotation.
