@@ -177,6 +177,8 @@ def _figures(report: dict[str, Any]) -> dict[str, Any]:
             continue
         if name == "milliseconds":
             row |= {f"milliseconds.{stage}": times["median"] for stage, times in value.items()}
+        elif name == "imu" and value is not None:
+            row["imu.verdict"] = value["verdict"]
         elif isinstance(value, list):
             row[name] = len(value)
         elif value is None or isinstance(value, str | int | float):

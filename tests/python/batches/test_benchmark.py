@@ -142,6 +142,9 @@ def test_published_names() -> None:
     assert lost.system == "ORB-SLAM2"
     assert published_figures("euroc", "cut_V1_01_easy", "stereo") == []
     assert published_figures("tum", "rgbd_dataset_freiburg1_desk", "mono") == []
+    (with_imu,) = published_figures("euroc", "V2_03_difficult", "mono", imu=True)
+    assert (with_imu.system, with_imu.ate_rmse_m) == ("ORB-SLAM3", 0.027)
+    assert published_figures("kitti", "00", "stereo", imu=True) == []
     (desk,) = published_figures("tum", "freiburg1_desk", "rgbd")
     assert desk.ate_rmse_m == 0.016
     assert re.search(r"2017.*Table III", desk.source)

@@ -66,6 +66,11 @@ class Entry:
         return next((one for one in self.published if one.system == system), None)
 
 
+def _uses_imu(rows: list[dict[str, Any]]) -> bool:
+    """Whether runs had an IMU that fits the camera."""
+    return any(row.get("imu.verdict") == "fits" for row in rows)
+
+
 def entries_of(kind: StandardSet, rows: list[dict[str, Any]]) -> list[Entry]:
     """Put runs that differ in their seeds alone together, sensor by sensor."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
@@ -76,7 +81,7 @@ def entries_of(kind: StandardSet, rows: list[dict[str, Any]]) -> list[Entry]:
             sequence,
             sensor,
             sorted(members, key=lambda row: int(row["seed"])),
-            published_figures(kind, sequence, sensor),
+            published_figures(kind, sequence, sensor, imu=_uses_imu(members)),
         )
         for (sensor, sequence), members in sorted(groups.items())
     ]

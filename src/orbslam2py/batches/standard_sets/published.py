@@ -46,7 +46,9 @@ class Published:
     is_lost: bool = False
 
 
-def published_figures(kind: StandardSet | str, sequence: str, sensor: str) -> list[Published]:
+def published_figures(
+    kind: StandardSet | str, sequence: str, sensor: str, *, imu: bool = False
+) -> list[Published]:
     """Return what papers tell of a sequence; nothing where no figure is given.
 
     Parameters
@@ -57,6 +59,8 @@ def published_figures(kind: StandardSet | str, sequence: str, sensor: str) -> li
         Name of the sequence's folder.
     sensor
         ``mono``, ``stereo`` or ``rgbd``.
+    imu
+        Whether an IMU was used beside it.
 
     Returns
     -------
@@ -69,7 +73,7 @@ def published_figures(kind: StandardSet | str, sequence: str, sensor: str) -> li
         return []
     found = []
     for table in _tables()["tables"]:
-        if (table["set"], table["sensor"]) != (kind.value, sensor):
+        if (table["set"], table["sensor"], table.get("imu", False)) != (kind.value, sensor, imu):
             continue
         figures = table["figures"].get(named[1])
         source = f"{_tables()['papers'][table['system']]}, {table['table']}"
