@@ -135,7 +135,9 @@ def _refuse(entry: Entry | None, text: str, path: Path) -> None:
 def _refuse_unnamed_fisheye(entries: Mapping[str, Entry], lens: FileLens, path: Path) -> None:
     """Refuse coefficients of a fisheye lens in the file of a pinhole."""
     named = f"write {TYPES['kannala_brandt']} in place of {lens.entry.value}" if lens.entry else ""
-    for camera in ("Camera", "Camera1", "Camera2"):
+    second = entries.get("Camera2.type")
+    is_fisheye = second is not None and _model_of(second) != PINHOLE
+    for camera in ("Camera", "Camera1", *(() if is_fisheye else ("Camera2",))):
         if _has_four_radial(entries, camera):
             key = f"{camera}.k4"
             _refuse(

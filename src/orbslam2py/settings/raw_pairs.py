@@ -217,6 +217,15 @@ def _camera(
             return None
     fields: dict[str, Any] = dict(values)
     if lens is not None:
+        for name in set(LENS_NUMBERS) - {*_INTRINSICS, *lens}:
+            other = entries.get(f"{prefix}.{name}")
+            if other is not None and _read(other, problems) != 0:
+                text = (
+                    f"{other.key} is {other.value}, and the lens {model} has "
+                    f"{', '.join(lens)} alone; name the model to which all coefficients belong"
+                )
+                problems.append(Problem(other.line, text))
+                return None
         fields = {name: values[name] for name in _INTRINSICS}
         fields |= {"model": model, "lens": tuple(values[name] for name in lens)}
     try:

@@ -16,9 +16,11 @@ from orbslam2py.settings.settings import Settings
 
 _log = logging.getLogger(__name__)
 
-#: A pair comes rectified if the rows of its points differ by less than this part of what they differ
-#: by after rectification; and the number of points that may tell.
+#: A pair comes rectified if the rows of its points differ by less than this part of the difference
+#: after rectification; and the least number of points.
 _CLEARLY_LESS, _LEAST_POINTS = 0.7, 50
+#: Row difference after rectification that is noise of the keypoints [px].
+_NOISE = 0.5
 #: Descriptor distance of the same point, and row difference beyond which it is another one [px].
 _MOST_BITS, _MOST_ROWS = 50, 15.0
 _TEXT = (
@@ -97,7 +99,7 @@ class RawPairs:
             return False  # a dark image does not count
         self._undecided = False
         apart = float(np.median(given[near])), float(np.nanmedian(rectified[near]))
-        if apart[0] > _CLEARLY_LESS * apart[1]:
+        if apart[0] > _CLEARLY_LESS * apart[1] or apart[1] < _NOISE:
             return False
         self.warning = _TEXT.format(given=apart[0], rectified=apart[1])
         _log.warning("%s", self.warning)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py import Settings, SettingsError
+from orbslam2py import Sensor, Settings, SettingsError
 from orbslam2py.calibration.camera_files import read_camera_file
 from orbslam2py.settings.comparison import calibration_distance
+from orbslam2py.settings.fisheye import fisheye_model
 from support import fisheye_cameras as fisheyes
 from support import foreign_cameras as files
 from support.fisheye_cameras import FCA_HEAD, FILES, KB, KB_NAMED, kalibr
@@ -121,15 +122,21 @@ def test_a_fisheye_that_cannot_be(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["kb4", "ds", "eucm"])
-def test_a_pair_of_fisheyes_is_refused_and_one_of_them_read(tmp_path: Path, kind: str) -> None:
+def test_a_pair_of_fisheyes_is_read_and_one_of_them(tmp_path: Path, kind: str) -> None:
     values = files.NUMBERS | KB_NAMED | fisheyes.DS_NAMED | fisheyes.EUCM_NAMED
     (tmp_path / "file").write_text(files.basalt(kind, values, {**values, "fx": 290.0}))
     for sensor in (None, "stereo"):
-        with pytest.raises(SettingsError) as caught:
-            read_camera_file(tmp_path / "file", sensor=sensor)
-        told = "a stereo pair of fisheye cameras is not supported yet; take one of them with"
-        assert told in str(caught.value)
-        assert "--camera 0" in str(caught.value)
+        settings = read_camera_file(tmp_path / "file", sensor=sensor)
+        assert settings.sensor is Sensor.STEREO
+        if settings.right is not None:
+            raw = settings.camera, settings.right.camera
+            assert [one.fx for one in raw] == [FX, 290.0]
+            assert raw[0].model == raw[1].model == fisheye_model(kind)
+        else:
+            pair = settings.rectification
+            assert pair is not None
+            assert [one.K[0, 0] for one in (pair.left, pair.right)] == [FX, 290.0]
+            assert pair.left.model == fisheye_model(kind)
     assert read_camera_file(tmp_path / "file", camera=1).camera.fx == 290.0
     assert read_camera_file(tmp_path / "file", sensor="mono").camera.fx == FX
 

@@ -148,8 +148,8 @@ def test_fisheye_is_read_and_told(
 def test_one_fisheye_is_no_pair(command: CommandLine, tmp_path: Path, name: str) -> None:
     written(tmp_path, FILES[name][0], "file")
     message = refused(command(*IMPORT, "--sensor", "stereo"))
-    assert "a stereo pair of fisheye cameras is not supported yet" in message
-    assert "use one of its cameras alone (--sensor mono)" in message
+    assert "a stereo pair of fisheye cameras needs both cameras" in message
+    assert "--sensor mono uses one camera alone" in message
     assert command(*IMPORT, "--sensor", "mono").code == 0
 
 

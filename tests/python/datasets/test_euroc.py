@@ -121,7 +121,7 @@ def test_euroc_stamp_twice_or_backwards(euroc: Path, caplog: pytest.LogCaptureFi
 
 
 def test_a_fisheye_of_tum_vi(euroc: Path) -> None:
-    """One camera is read with its lens; the pair is refused."""
+    """One camera is read with its lens, and so is the pair, which is rectified: it sees little."""
     for camera in ("cam0", "cam1"):
         path = euroc / "mav0" / camera / "sensor.yaml"
         path.write_text(path.read_text().replace("radial-tangential", "equidistant"))
@@ -131,8 +131,11 @@ def test_a_fisheye_of_tum_vi(euroc: Path) -> None:
     assert camera.model == "kannala_brandt"
     assert camera.lens == tuple(map(float, numbers.split(",")))
     assert (camera.fx, camera.is_distorted) == (40.0, False)
-    with pytest.raises(DatasetError, match=r"sensor\.yaml: a stereo pair of fisheye"):
-        _ = open_sequence(euroc, Sensor.STEREO).settings
+    pair = open_sequence(euroc, Sensor.STEREO).settings
+    assert pair.rectification is not None
+    assert pair.rectification.applied
+    assert pair.rectification.left.model == "kannala_brandt"
+    assert tuple(pair.rectification.left.D) == camera.lens
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ CASES = {
     ),
     "pose of a fisheye pair": Case(
         OURS_DEPTH + "Tlr: 3\n",
-        ("unknown key Tlr", "describes the camera"),
+        ("Camera2.fx, Camera2.fy, Camera2.cx, Camera2.cy", "missing: a raw pair needs"),
         sensor="stereo",
     ),
     # ---- two numbers for one thing -------------------------------------------------------------

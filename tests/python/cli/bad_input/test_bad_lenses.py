@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py import Settings
 from support import fisheye_cameras as fisheyes
 from support import other_settings as texts
 from support.command_line import CommandLine
@@ -27,10 +26,6 @@ FOUR = "Camera.k1: -0.01\nCamera.k2: 0.05\nCamera.k3: -0.04\nCamera.k4: 0.01\n"
 FISHEYE = (
     "belongs to a fisheye calibration (Kannala-Brandt, k1 to k4)",
     "if it is a rational distortion, add k5 and k6 (0 if there are none)",
-)
-PAIR_OF_FISHEYES = (
-    "a stereo pair of fisheye cameras is not supported yet; use one of its cameras alone (--sensor",
-    "cv2.fisheye.initUndistort",
 )
 
 CASES = {
@@ -122,14 +117,28 @@ CASES = {
         lambda text: text + FOUR,
         lambda settings: settings.camera.lens == (-0.01, 0.05, -0.04, 0.01),
     ),
-    "fisheye pair of ORB-SLAM3": Case(
+    "right camera of a pinhole in a fisheye pair": Case(
         fisheyes.PAIR,
-        ("a.yaml:3: Camera.type KannalaBrandt8: ", *PAIR_OF_FISHEYES, "--baseline METRES"),
+        ("Camera2.k3, Camera2.k4 missing: a raw pair needs Camera1.* and Camera2.*",),
+        lambda text: text.replace("Camera2.p1: -0.0001", "Camera2.k3: 0.1").replace(
+            "Camera2.p2: 0.0003", "Camera2.k4: 0.0"
+        ),
+        lambda settings: settings.right is None and settings.rectification is not None,
         sensor="stereo",
     ),
-    "fisheye pair": Case(
+    "tangential distortion of a right fisheye": Case(
+        fisheyes.PAIR + "Camera2.k3: 0.1\nCamera2.k4: 0.0\n",
+        ("Camera2.p", "the lens kannala_brandt has k1, k2, k3, k4 alone; name the model"),
+        sensor="stereo",
+    ),
+    "left fisheye without a right one": Case(
+        fisheyes.MONO + "Camera.bf: 40\nThDepth: 40\n",
+        ("Camera.type KannalaBrandt8: a stereo pair", "Camera2.fx", "--sensor mono"),
+        sensor="stereo",
+    ),
+    "five coefficients of a rectified fisheye": Case(
         texts.STELLA_STEREO.replace('  model: "perspective"\n  K_', '  model: "fisheye"\n  K_'),
-        ("StereoRectifier.model fisheye", *PAIR_OF_FISHEYES, "--baseline METRES"),
+        ("left: a kannala_brandt camera has 4 lens parameters, got 5; give k1, k2, k3, k4",),
         sensor="stereo",
     ),
 }
@@ -138,21 +147,6 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_lens_is_refused_and_following_the_message_helps(command: CommandLine, name: str) -> None:
     refuse_and_follow(command, CASES[name])
-
-
-def test_the_line_for_undistorted_images_makes_settings(command: CommandLine) -> None:
-    """What a fisheye pair is answered with works as it stands, but for the numbers."""
-    Path("a.yaml").write_text(fisheyes.PAIR)
-    line = (
-        command("settings", "check", "a.yaml", "--sensor", "stereo")
-        .err.strip()
-        .splitlines()[-1]
-        .split()[1:]
-    )
-    numbers = {"FX": "300", "FY": "301", "CX": "160", "CY": "120", "METRES": "0.1"}
-    done = command(*(numbers.get(word, word) for word in line))
-    assert done.code == 0, done.err
-    assert Settings.load("my.yaml", "stereo").camera.fy == 301
 
 
 def test_a_fisheye_is_refused_by_a_run(command: CommandLine, stereo: Path) -> None:
