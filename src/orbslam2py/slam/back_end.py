@@ -69,6 +69,7 @@ class BackEnd:
             config.mapping,
             threaded=threaded,
             adjustment_threads=n_threads(2) if images_wait else 1,
+            alignment=config.alignment,
         )
         self.adjustment = FullBundleAdjustment(
             self.map,

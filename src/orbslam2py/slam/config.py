@@ -314,6 +314,19 @@ class TrajectoryConfig:
 
 
 @dataclass(frozen=True)
+class AlignmentConfig:
+    """Which positions are measured by aligning patches of grey values."""
+
+    right_image: bool = False
+    """Align the right image of a stereo pair to the left one at every keypoint with a depth."""
+    new_keyframes: bool = False
+    """Align the sightings of new keyframes and new points before local bundle adjustment."""
+    tracked_inliers: int = 0
+    """Most inliers of a tracked frame that are aligned before its last pose optimization;
+    0: none."""
+
+
+@dataclass(frozen=True)
 class Config:
     """All sections of the configuration.
 
@@ -335,6 +348,7 @@ class Config:
     loops: LoopConfig = field(default_factory=LoopConfig)
     merging: MergingConfig = field(default_factory=MergingConfig)
     trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Config:
         """Return a configuration with other values.
@@ -362,6 +376,17 @@ class Config:
         """Return what differs from the defaults, by names with a dot."""
         usual = Config()
         return {name: value for name, value in all_values(self) if value != value_of(usual, name)}
+
+    @property
+    def aligns_patches(self) -> bool:
+        """Whether frames keep their images for a while."""
+        alignment = self.alignment
+        return alignment.right_image or self.aligns_points
+
+    @property
+    def aligns_points(self) -> bool:
+        """Whether map points need a patch of their reference sighting."""
+        return self.alignment.new_keyframes or self.alignment.tracked_inliers > 0
 
     def for_features(self, n_features: int) -> Config:
         """Return the configuration for images with so many features: fewer inliers of few ones."""

@@ -44,10 +44,20 @@ class FrontEnd:
         Which images come.
     check_calibration : bool
         Warn if the calibration cannot belong to images of that size.
+    keep_images : bool
+        Frames keep their image pyramids until these are released.
+    align_right : bool
+        Align the right images of pairs to the left ones; needs the images.
     """
 
     def __init__(
-        self, settings: Settings, sensor: Sensor, *, check_calibration: bool = True
+        self,
+        settings: Settings,
+        sensor: Sensor,
+        *,
+        check_calibration: bool = True,
+        keep_images: bool = False,
+        align_right: bool = False,
     ) -> None:
         self._settings = settings
         self._sensor = sensor
@@ -59,6 +69,8 @@ class FrontEnd:
         self._extractors = {1: self._extractor}
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
+        self._keep_images = keep_images or align_right
+        self._align_right = align_right
         self._told_depth_size = False
         self.depth_check = DepthCheck(settings.depth_factor)
         self.pair_check = PairCheck()
@@ -90,10 +102,9 @@ class FrontEnd:
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
             extractor = self._extractor_for(feature_factor)
-            frame = core.build_monocular_frame(
-                context, frame_id, timestamp, extractor.extract(grey, mask)
-            )
-            return self._finished(frame, image, grey)
+            extraction = extractor.extract(grey, mask)
+            frame = core.build_monocular_frame(context, frame_id, timestamp, extraction)
+            return self._finished(frame, image, grey, extraction)
 
     def _extractor_for(self, factor: int) -> core.OrbExtractor:
         if factor not in self._extractors:
@@ -139,7 +150,10 @@ class FrontEnd:
             frame = core.build_stereo_frame(
                 context, frame_id, timestamp, features_left, features_right
             )
-            return self._finished(frame, left, left_grey)
+            frame = self._finished(frame, left, left_grey, features_left, features_right)
+            if self._align_right:
+                core.align_right_columns(frame)
+            return frame
 
     def rgbd(
         self,
@@ -171,7 +185,7 @@ class FrontEnd:
             frame = core.build_rgbd_frame(
                 context, frame_id, timestamp, extraction, depth, self._settings.depth_factor
             )
-            return self._finished(frame, image, grey)
+            return self._finished(frame, image, grey, extraction)
 
     def _enlarged(
         self, depth: npt.NDArray[np.generic], image: npt.NDArray[np.uint8]
@@ -192,8 +206,15 @@ class FrontEnd:
         return enlarged_depth(depth, image.shape)
 
     def _finished(
-        self, frame: core.Frame, image: npt.NDArray[np.uint8], grey: npt.NDArray[np.uint8]
+        self,
+        frame: core.Frame,
+        image: npt.NDArray[np.uint8],
+        grey: npt.NDArray[np.uint8],
+        left: core.Extraction,
+        right: core.Extraction | None = None,
     ) -> core.Frame:
+        if self._keep_images:
+            core.keep_images(frame, left, right)
         core.keep_small_image(frame, grey)
         if image.ndim == 3:
             core.sample_colours(frame, image, self._settings.camera.rgb)

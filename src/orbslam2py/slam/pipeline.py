@@ -33,6 +33,7 @@ from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
+from orbslam2py.slam.kept_images import KeptImages
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import Setup, SystemOptions
@@ -98,8 +99,13 @@ class Pipeline:
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images
         self.front_end = FrontEnd(
-            setup.settings, sensor, check_calibration=options.check_calibration
+            setup.settings,
+            sensor,
+            check_calibration=options.check_calibration,
+            keep_images=config.aligns_points,
+            align_right=config.alignment.right_image and sensor is Sensor.STEREO,
         )
+        self._kept_images = KeptImages() if config.aligns_patches else None
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         self.tracking = _make_tracking(setup, back_end, options, config)
         self.localization = LocalizationSwitch(
@@ -200,6 +206,12 @@ class Pipeline:
                 frame, timer, localize=self.localization.on, details=details or bool(watchers)
             )
         self.statistics.add(timer.milliseconds)
+        if self._kept_images is not None:
+            self._kept_images.note(
+                frame.features,
+                is_keyframe=outcome.is_keyframe,
+                waiting=outcome.state is not TrackingState.OK or outcome.estimate.unconfirmed,
+            )
 
         if outcome.estimate.unconfirmed:
             self.recorder.doubt(frame)
@@ -373,7 +385,14 @@ class Pipeline:
 def _make_search(
     setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
 ) -> PoseSearch:
-    return PoseSearch(back_end.map, setup.vocabulary, setup.sensor, relocalizer, config.tracking)
+    return PoseSearch(
+        back_end.map,
+        setup.vocabulary,
+        setup.sensor,
+        relocalizer,
+        config.tracking,
+        config.alignment.tracked_inliers,
+    )
 
 
 def _make_tracking(

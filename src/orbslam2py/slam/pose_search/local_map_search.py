@@ -61,6 +61,8 @@ class LocalMapSearch:
         What the images come from.
     config : TrackingConfig
         Limits.
+    aligned_inliers : int
+        Most inliers that are aligned to the patches of their points at the end; 0: none.
     """
 
     def __init__(
@@ -68,9 +70,11 @@ class LocalMapSearch:
         slam_map: core.Map,
         sensor: Sensor,
         config: TrackingConfig,
+        aligned_inliers: int = 0,
     ) -> None:
         self._map = slam_map
         self._limits = config
+        self._aligned_inliers = aligned_inliers
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
@@ -108,6 +112,7 @@ class LocalMapSearch:
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
+        optimized = self._aligned(frame, optimized)
         estimate = self._enough_found(frame, first, optimized)
         if estimate.visual_odometry:
             return _beyond_the_map(frame, estimate, state)
@@ -148,6 +153,7 @@ class LocalMapSearch:
             frame.clear_associations()
             visible = core.match_local_map(frame, local_map.points, nothing, window).visible
             optimized = core.optimize_pose(frame)
+        optimized = self._aligned(frame, optimized)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
         elsewhere = in_doubt or _is_elsewhere(frame, refined)
         if optimized.n_inliers < share * n_of_map or not elsewhere:
@@ -156,6 +162,16 @@ class LocalMapSearch:
         if estimate.visual_odometry or not estimate.found:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, len(visible))
+
+    def _aligned(
+        self, frame: core.TrackedFrame, optimized: core.PoseEstimate
+    ) -> core.PoseEstimate:
+        """Optimize once more with inliers at the places where patches put them."""
+        enough = optimized.n_inliers >= self._limits.local_map_inliers
+        if not (self._aligned_inliers and enough):
+            return optimized
+        core.align_frame(self._map, frame, self._aligned_inliers)
+        return core.optimize_pose(frame)
 
     def _enough_found(
         self,
