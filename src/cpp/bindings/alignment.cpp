@@ -172,6 +172,12 @@ void bind_map_alignment(py::module_& module) {
       "Factors on the standard deviations that patches give: (positions, right columns), as the\n"
       "map's adjustments have measured them.");
   module.def(
+      "assume_alignment_noise",
+      [](Map& map, double over_corner) { map.noise().assume(over_corner); }, "map"_a,
+      "over_corner"_a,
+      "Standard deviation of aligned sightings over that of corners; 0: as patches and adjustments\n"
+      "say. To be set before the map is worked on.");
+  module.def(
       "count_aligned",
       [](const Map& map) {
         const auto lock = map.read_lock();

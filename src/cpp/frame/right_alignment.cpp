@@ -18,10 +18,29 @@ constexpr std::size_t kChunk = 128;
 /// Most rows by which the right image may be off its rectification [pixels of the level].
 constexpr double kMostRows = 1.5;
 
+/// Most rows by which the two images of a pair may usually differ [pixels of the level]: where the
+/// rectification is worse than that, a column is no better than its parabola.
+constexpr float kMostRowError = 0.1F;
+/// Fewest keypoints that say something of the rows.
+constexpr std::size_t kFewestRows = 30;
+
 struct Aligned {
   float right_u = 0;
-  float variance = 0;  ///< 0: not aligned
+  float variance = 0;   ///< 0: not aligned
+  float row_error = 0;  ///< right minus left row [pixels of the level]
 };
+
+/// Median of the distances between rows; 0 when there are too few.
+float usual_row_error(const std::vector<Aligned>& aligned) {
+  std::vector<float> distances;
+  for (const Aligned& one : aligned) {
+    if (one.variance > 0) distances.push_back(std::abs(one.row_error));
+  }
+  if (distances.size() < kFewestRows) return 0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
 
 Aligned align_one(const Keypoint& keypoint, float right_u, const cv::Mat& left,
                   const cv::Mat& right, const LevelPlacement& place) {
@@ -36,6 +55,7 @@ Aligned align_one(const Keypoint& keypoint, float right_u, const cv::Mat& left,
   const double variance = aligned.information.inverse()(0, 0) + kLeastAlignedVariance;
   result.right_u = place.x.to_image(static_cast<float>(aligned.position.x()));
   result.variance = static_cast<float>(variance * scale * scale);
+  result.row_error = static_cast<float>(aligned.position.y() - start.y());
   return result;
 }
 
@@ -59,6 +79,7 @@ int align_right_columns(Frame& frame, double bf, double max_disparity) {
                              images->right.levels[level], places[level]);
     }
   });
+  if (usual_row_error(aligned) > kMostRowError) return 0;
   frame.right_variance.assign(frame.size(), 0);
   int n_aligned = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {

@@ -40,12 +40,6 @@ std::vector<Sighting> sightings_of(const Map& map, const TrackedFrame& frame, st
   return chosen;
 }
 
-/// Inverse variance, never less than that of a corner.
-float weight_of(const NoiseFactor& noise, float variance, float corner) {
-  const double factor = noise.value();
-  return std::max(corner, static_cast<float>(1 / (factor * factor * static_cast<double>(variance))));
-}
-
 }  // namespace
 
 AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most) {
@@ -73,10 +67,11 @@ AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t mos
     pixel.u = found.u;
     pixel.v = found.v;
     pixel.right_u = f.right_u[s.slot] + (found.u - keypoint.x);
-    pixel.inverse_sigma2 = weight_of(map.noise().position, found.variance, corner);
+    pixel.inverse_sigma2 = map.noise().weight(map.noise().position, found.variance, corner);
     const float right = f.right_variance.empty() ? 0 : f.right_variance[s.slot];
     const float right_weight =
-        right > 0 ? weight_of(map.noise().right, right + found.variance, corner) : corner;
+        right > 0 ? map.noise().weight(map.noise().right, right + found.variance, corner)
+                  : corner;
     pixel.right_factor = right_weight / pixel.inverse_sigma2;
   }
   return counts;

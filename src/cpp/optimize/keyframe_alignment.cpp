@@ -132,29 +132,6 @@ void cut_missing_patches(Task& task) {
   }
 }
 
-float own_right_variance(const Frame& frame, std::size_t slot) {
-  return frame.right_variance.empty() ? 0 : frame.right_variance[slot];
-}
-
-void align_right(const PlacedPatch& placed, const View& view, Sighting& sighting) {
-  const Frame& frame = *view.frame;
-  AlignedSighting& result = sighting.result;
-  const float own = own_right_variance(frame, sighting.slot);
-  if (own > 0) {
-    result.right_variance = own + (result.reference ? 0 : result.variance);
-    return;
-  }
-  const bool searched =
-      !view.images->right.levels.empty() && frame.right_variance.empty() && !frame.camera->distorts();
-  if (!searched) return;
-  const Pose T_rc(Eigen::Matrix3d::Identity(), {-frame.camera->baseline(), 0, 0});
-  const FoundPatch right = find_patch(placed, frame, T_rc * view.T_cw, view.images->right,
-                                      {frame.right_u[sighting.slot], frame.keypoints[sighting.slot].y});
-  if (!right.ok()) return;
-  result.right_u = right.u;
-  result.right_variance = right.variance;
-}
-
 void align_one(const Task& task, Sighting& sighting) {
   const Point& point = task.points[sighting.point];
   if (!point.surface) return;
@@ -185,7 +162,9 @@ void align_one(const Task& task, Sighting& sighting) {
   }
   if (!frame.has_depth(sighting.slot)) return;
   result.right_u = frame.right_u[sighting.slot] + (result.u - keypoint.x);
-  align_right(placed, view, sighting);
+  // The disparity stays, with the noise that it has.
+  const float own = frame.right_variance.empty() ? 0 : frame.right_variance[sighting.slot];
+  if (own > 0) result.right_variance = own + (result.reference ? 0 : result.variance);
 }
 
 void commit(const Task& task, bool patches_only, Map& map) {
@@ -239,34 +218,35 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_onl
   return result;
 }
 
-void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
+void measure_noise(const GatheredBundle& bundle, AlignedNoise& noise) {
   const BundleProblem& problem = bundle.problem;
   std::vector<double> squares, right_squares;
   double n_residuals = 0;
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
     const auto& o = problem.observations[i];
     n_residuals += o.has_depth ? 3 : 2;
-    const ObservationKind kind = bundle.kinds[i];
-    if (kind != ObservationKind::kAligned && kind != ObservationKind::kAlignedRight) continue;
+    const ObservationSource& source = bundle.sources[i];
+    const bool right_aligned = source.kind == ObservationKind::kAlignedRight;
+    if (source.kind != ObservationKind::kAligned && !right_aligned) continue;
     const auto& camera = problem.cameras[o.camera];
     const Eigen::Vector3d p = camera.T_cw * problem.points[o.point];
     Eigen::Vector2d error;
     if (!camera.model->error(p, o.u, o.v, error)) continue;
-    const double weight = o.inverse_sigma2;
-    squares.push_back(weight * error.x() * error.x());
-    squares.push_back(weight * error.y() * error.y());
-    if (kind != ObservationKind::kAlignedRight || !o.has_depth) continue;
+    const double variance = source.variance;
+    squares.push_back(error.x() * error.x() / variance);
+    squares.push_back(error.y() * error.y() / variance);
+    if (!right_aligned || !o.has_depth) continue;
     const double right = camera.model->right_error(p, error, o.u, o.right_u);
-    right_squares.push_back(weight * static_cast<double>(o.right_factor) * right * right);
+    right_squares.push_back(right * right / static_cast<double>(source.right_variance));
   }
   const double n_free = static_cast<double>(problem.cameras.size()) - bundle.n_fixed();
   const double n_unknowns = 3 * static_cast<double>(problem.points.size()) + 6 * n_free;
   if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
   // The adjustment has taken so much of the noise into its unknowns.
   const double lost = n_residuals / (n_residuals - n_unknowns);
-  noise.position.measure(noise.position.value() * factor_of(squares, lost));
+  noise.position.measure(factor_of(squares, lost));
   if (right_squares.size() < kFewestResiduals) return;
-  noise.right.measure(noise.right.value() * factor_of(right_squares, lost));
+  noise.right.measure(factor_of(right_squares, lost));
 }
 
 }  // namespace orbslam

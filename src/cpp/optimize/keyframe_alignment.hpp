@@ -22,6 +22,6 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_onl
 
 /// Lets the noise factors of the map follow what an adjustment left over of its aligned sightings.
 /// `bundle` is solved. Takes no lock.
-void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise);
+void measure_noise(const GatheredBundle& bundle, AlignedNoise& noise);
 
 }  // namespace orbslam

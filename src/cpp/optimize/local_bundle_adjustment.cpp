@@ -128,7 +128,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, LocalBundleResult& res
 void acquit_aligned(const GatheredBundle& bundle, const Map& map,
                     std::vector<std::uint8_t>& outlier) {
   for (std::size_t i = 0; i < outlier.size(); ++i) {
-    if (outlier[i] == 0 || bundle.kinds[i] == ObservationKind::kKeypoint) continue;
+    if (outlier[i] == 0 || bundle.sources[i].kind == ObservationKind::kKeypoint) continue;
     const auto& o = bundle.problem.observations[i];
     const auto& camera = bundle.problem.cameras[o.camera];
     const KeyFrame* keyframe = map.find(bundle.keyframes[o.camera]);

@@ -16,6 +16,7 @@ from typing import Any
 
 from orbslam2py._arguments import is_finite, is_whole, shown
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.sensor import Sensor
 
 #: The numbers of inliers below are for images with so many features or more. Of fewer ones a share
 #: is asked for: fewer points meet fewer keypoints by chance, and fewer can be found of them.
@@ -319,11 +320,37 @@ class AlignmentConfig:
 
     right_image: bool = False
     """Align the right image of a stereo pair to the left one at every keypoint with a depth."""
-    new_keyframes: bool = False
-    """Align the sightings of new keyframes and new points before local bundle adjustment."""
-    tracked_inliers: int = 0
-    """Most inliers of a tracked frame that are aligned before its last pose optimization;
-    0: none."""
+    new_keyframes: bool = True
+    """Align the sightings of new keyframes and new points before local bundle adjustment, with
+    stereo and RGB-D."""
+    new_keyframes_monocular: bool = False
+    """The same with a single camera."""
+    tracked_inliers: int = 200
+    """Most inliers of a tracked frame that are aligned before its last pose optimization, with
+    stereo and RGB-D; 0: none."""
+    tracked_inliers_monocular: int = 0
+    """The same with a single camera."""
+    noise: float = 0.5
+    """Standard deviation of an aligned sighting over that of a corner; 0: as patches and
+    residuals say, which needs an exact calibration."""
+
+    def for_sensor(self, sensor: Sensor) -> AlignmentConfig:
+        """Return the values in use: those for a single camera take the others' place."""
+        if sensor is Sensor.STEREO:
+            return self
+        changed = replace(self, right_image=False)
+        if sensor.has_depth:
+            return changed
+        return replace(
+            changed,
+            new_keyframes=self.new_keyframes_monocular,
+            tracked_inliers=self.tracked_inliers_monocular,
+        )
+
+    @property
+    def uses_points(self) -> bool:
+        """Whether map points need a patch of their reference sighting."""
+        return self.new_keyframes or self.tracked_inliers > 0
 
 
 @dataclass(frozen=True)
@@ -376,17 +403,6 @@ class Config:
         """Return what differs from the defaults, by names with a dot."""
         usual = Config()
         return {name: value for name, value in all_values(self) if value != value_of(usual, name)}
-
-    @property
-    def aligns_patches(self) -> bool:
-        """Whether frames keep their images for a while."""
-        alignment = self.alignment
-        return alignment.right_image or self.aligns_points
-
-    @property
-    def aligns_points(self) -> bool:
-        """Whether map points need a patch of their reference sighting."""
-        return self.alignment.new_keyframes or self.alignment.tracked_inliers > 0
 
     def for_features(self, n_features: int) -> Config:
         """Return the configuration for images with so many features: fewer inliers of few ones."""

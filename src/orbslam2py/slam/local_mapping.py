@@ -34,8 +34,8 @@ class LocalMapping:
         Of local bundle adjustment, 1 or 2; the result is the same.
     config : MappingConfig
         Limits.
-    alignment : AlignmentConfig
-        Whether sightings are aligned.
+    alignment : AlignmentConfig or None
+        What is aligned; None: nothing.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class LocalMapping:
         )
         self._adjustment_threads = adjustment_threads
         self._adjusted_keyframes = limits.adjusted_keyframes
-        self._alignment = alignment or AlignmentConfig()
+        self._alignment = alignment
         #: Milliseconds per part of the work, over all keyframes.
         self.statistics = StageStatistics()
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
@@ -116,7 +116,7 @@ class LocalMapping:
 
     def _align(self, keyframe: int, timer: StageTimer) -> None:
         alignment = self._alignment
-        if not (alignment.new_keyframes or alignment.tracked_inliers):
+        if alignment is None or not alignment.uses_points:
             return
         with timer("mapping.align"):
             core.align_keyframes(

@@ -95,6 +95,7 @@ class Pipeline:
         sensor = setup.sensor
         self._sensor = sensor
         config = options.full_config.for_features(setup.settings.orb.n_features)
+        alignment = config.alignment.for_sensor(sensor)
         self._vocabulary = setup.vocabulary
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images
@@ -102,10 +103,10 @@ class Pipeline:
             setup.settings,
             sensor,
             check_calibration=options.check_calibration,
-            keep_images=config.aligns_points,
-            align_right=config.alignment.right_image and sensor is Sensor.STEREO,
+            keep_images=alignment.uses_points,
+            align_right=alignment.right_image,
         )
-        self._kept_images = KeptImages() if config.aligns_patches else None
+        self._kept_images = KeptImages()
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         self.tracking = _make_tracking(setup, back_end, options, config)
         self.localization = LocalizationSwitch(
@@ -206,12 +207,11 @@ class Pipeline:
                 frame, timer, localize=self.localization.on, details=details or bool(watchers)
             )
         self.statistics.add(timer.milliseconds)
-        if self._kept_images is not None:
-            self._kept_images.note(
-                frame.features,
-                is_keyframe=outcome.is_keyframe,
-                waiting=outcome.state is not TrackingState.OK or outcome.estimate.unconfirmed,
-            )
+        self._kept_images.note(
+            frame.features,
+            is_keyframe=outcome.is_keyframe,
+            waiting=outcome.state is not TrackingState.OK or outcome.estimate.unconfirmed,
+        )
 
         if outcome.estimate.unconfirmed:
             self.recorder.doubt(frame)
@@ -391,7 +391,7 @@ def _make_search(
         setup.sensor,
         relocalizer,
         config.tracking,
-        config.alignment.tracked_inliers,
+        config.alignment.for_sensor(setup.sensor).tracked_inliers,
     )
 
 

@@ -163,9 +163,7 @@ class LocalMapSearch:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, len(visible))
 
-    def _aligned(
-        self, frame: core.TrackedFrame, optimized: core.PoseEstimate
-    ) -> core.PoseEstimate:
+    def _aligned(self, frame: core.TrackedFrame, optimized: core.PoseEstimate) -> core.PoseEstimate:
         """Optimize once more with inliers at the places where patches put them."""
         enough = optimized.n_inliers >= self._limits.local_map_inliers
         if not (self._aligned_inliers and enough):
