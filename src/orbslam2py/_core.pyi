@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_patch', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
+__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_frame', 'align_keyframes', 'align_patch', 'align_right_columns', 'align_rotation', 'alignment_noise', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'assume_alignment_noise', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_aligned', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_images', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'release_images', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -695,9 +695,20 @@ class Frame:
         (n, 2) float32, pixels of the image as it was given.
         """
     @property
+    def has_images(self) -> bool:
+        """
+        Whether the frame still keeps its image pyramids.
+        """
+    @property
     def right_u(self) -> numpy.typing.NDArray[numpy.float32]:
         """
         (n,) float32, column in the right image [px]; meaningful where depth > 0.
+        """
+    @property
+    def right_variance(self) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        (n,) float32, variance of right columns that were aligned, before the factor of the
+        noise [px^2], 0 for others; (0,) where nothing was aligned.
         """
     @property
     def sigma2(self) -> numpy.typing.NDArray[numpy.float32]:
@@ -769,6 +780,11 @@ class TrackedFrame:
     @T_cw.setter
     def T_cw(self, arg1: Pose | None) -> None:
         ...
+    @property
+    def aligned(self) -> numpy.typing.NDArray[numpy.bool_]:
+        """
+        (n,) bool, whether a keypoint's point is seen where its patch was aligned.
+        """
     @property
     def big_change(self) -> int:
         """
@@ -3300,16 +3316,37 @@ def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typi
     with `last`; temporary points left there are dropped first. Their ids start at
     FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
     """
+def align_frame(map: Map, frame: TrackedFrame, most: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[list[int], "FixedSize(5)"]:
+    """
+    Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the
+    sightings tried by AlignmentFailure.
+    """
+def align_keyframes(map: Map, keyframe: int, patches_only: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[int, typing.Annotated[list[int], "FixedSize(5)"]]:
+    """
+    Align sightings to the patches of their points, in a new keyframe and in its neighbours
+    that keep their images; cut the patches that are missing. Returns (number of new patches,
+    sightings tried by AlignmentFailure).
+    """
 def align_patch(reference: numpy.ndarray, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], A: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], image: numpy.ndarray, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], options: AlignmentOptions = ...) -> PatchAlignment:
     """
     Move the 9 x 9 patch at `position` of an image over another one until the grey values
     agree, but for gain and offset. Images: uint8 (h, w). `A`: (2, 2), maps pixels around
     `position` to pixels around `start`. Returns a PatchAlignment.
     """
+def align_right_columns(frame: Frame) -> int:
+    """
+    Align the right image of a new stereo frame, which keeps its images, to the left one at
+    every keypoint with a depth. Returns how many were aligned.
+    """
 def align_rotation(first: Frame, second: Frame) -> ImageRotation | None:
     """
     How the camera turned between two frames, by their small images alone: ImageRotation, or
     None where the images are missing or say nothing.
+    """
+def alignment_noise(map: Map) -> tuple[float, float]:
+    """
+    Factors on the standard deviations that patches give: (positions, right columns), as the
+    map's adjustments have measured them.
     """
 def anchor_frame(map: Map, frame: TrackedFrame, keyframe: int) -> None:
     """
@@ -3329,6 +3366,11 @@ def apply_map_merge(map: Map, merge: MapMerge) -> MapMergeResult:
 def assess_drift(map: Map, loop: Loop, fix_scale: bool) -> LoopDrift:
     """
     Compare a loop's correction with what drift can explain. Returns a LoopDrift.
+    """
+def assume_alignment_noise(map: Map, over_corner: typing.SupportsFloat | typing.SupportsIndex) -> None:
+    """
+    Standard deviation of aligned sightings over that of corners; 0: as patches and adjustments
+    say. To be set before the map is worked on.
     """
 def build_monocular_frame(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, extraction: Extraction) -> Frame:
     """
@@ -3388,6 +3430,10 @@ def commit_full_bundle(map: Map, bundle: GatheredBundle) -> FullBundleCommit:
 def corridor_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
     The lap through make_corridor with the same sizes.
+    """
+def count_aligned(map: Map) -> int:
+    """
+    Number of sightings that are aligned.
     """
 def count_map_points(frame: TrackedFrame) -> int:
     """
@@ -3508,6 +3554,10 @@ def index_keyframe(index: KeyFrameIndex, map: Map, id: int) -> None:
 def insert_keyframe(map: Map, frame: TrackedFrame, create_points: bool, n_minimum: typing.SupportsInt | typing.SupportsIndex = 100) -> int:
     """
     Make a keyframe of a tracked frame, with points from its depths; its id.
+    """
+def keep_images(frame: Frame, left: Extraction, right: Extraction | None = None) -> None:
+    """
+    Keep the image pyramids of a new frame, so that patches can be aligned in them.
     """
 def keep_small_image(frame: Frame, grey: numpy.ndarray) -> None:
     """
@@ -3721,6 +3771,10 @@ def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, nump
     `samples`: (k, 8) int32 indices into the matches, ascending by initial keypoint, instead
     of those drawn from `seed`. `two_threads` does not change the result. Raises ValueError
     for bad shapes, indices or options.
+    """
+def release_images(frame: Frame) -> None:
+    """
+    Give up the image pyramids of a frame.
     """
 def render(world: World, T_cw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"], fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, exposure: typing.SupportsFloat | typing.SupportsIndex = 1.0, noise_seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.float32]]:
     """

@@ -28,6 +28,10 @@ struct AlignmentOptions {
   double converged = 0.01;       ///< a step shorter than that is the last one [pixels]
 };
 
+/// Least variance of an aligned position [pixels of the level, squared]: what interpolation and the
+/// assumed shape of the patch leave.
+inline constexpr double kLeastAlignedVariance = 0.05 * 0.05;
+
 struct PatchAlignment {
   AlignmentFailure failure = AlignmentFailure::kOutside;
   int iterations = 0;

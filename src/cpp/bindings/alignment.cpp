@@ -7,6 +7,8 @@
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 #include "bindings/stop_flag.hpp"
+#include "optimize/frame_alignment.hpp"
+#include "optimize/keyframe_alignment.hpp"
 #include "optimize/sighting_alignment.hpp"
 
 namespace orbslam::bindings {
@@ -147,12 +149,56 @@ void bind_sightings(py::module_& module) {
                              "Median distance between sightings and points, pixels.");
 }
 
+void bind_map_alignment(py::module_& module) {
+  module.def(
+      "align_keyframes",
+      [](Map& map, KeyFrameId keyframe, bool patches_only, int n_threads) {
+        const KeyframeAlignment done = align_keyframes(map, keyframe, patches_only, n_threads);
+        return std::make_pair(done.n_patches, done.counts);
+      },
+      "map"_a, "keyframe"_a, "patches_only"_a = false, "n_threads"_a = 1, Release(),
+      "Align sightings to the patches of their points, in a new keyframe and in its neighbours\n"
+      "that keep their images; cut the patches that are missing. Returns (number of new patches,\n"
+      "sightings tried by AlignmentFailure).");
+  module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, Release(),
+             "Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the\n"
+             "sightings tried by AlignmentFailure.");
+  module.def(
+      "alignment_noise",
+      [](const Map& map) {
+        return std::make_pair(map.noise().position.value(), map.noise().right.value());
+      },
+      "map"_a,
+      "Factors on the standard deviations that patches give: (positions, right columns), as the\n"
+      "map's adjustments have measured them.");
+  module.def(
+      "assume_alignment_noise",
+      [](Map& map, double over_corner) { map.noise().assume(over_corner); }, "map"_a,
+      "over_corner"_a,
+      "Standard deviation of aligned sightings over that of corners; 0: as patches and adjustments\n"
+      "say. To be set before the map is worked on.");
+  module.def(
+      "count_aligned",
+      [](const Map& map) {
+        const auto lock = map.read_lock();
+        std::size_t n = 0;
+        map.for_each_point([&](const MapPoint& point) {
+          for (const Observation& o : point.observations) {
+            n += map.find(o.keyframe)->aligned_at(o.index, point.id) != nullptr ? 1 : 0;
+          }
+        });
+        return n;
+      },
+      "map"_a, Release(), "Number of sightings that are aligned.");
+}
+
 }  // namespace
 
 void bind_alignment(py::module_& module) {
   bind_failures(module);
   bind_patch(module);
   bind_sightings(module);
+  bind_map_alignment(module);
 }
 
 }  // namespace orbslam::bindings

@@ -12,6 +12,7 @@
 #include "frame/extract_pair.hpp"
 #include "frame/image_input.hpp"
 #include "frame/keypoint_colours.hpp"
+#include "frame/right_alignment.hpp"
 #include "frame/stereo_matching.hpp"
 
 namespace orbslam::bindings {
@@ -190,6 +191,14 @@ void bind_frame_class(py::module_& module) {
           "right_u", [](const Frame& f) { return to_array(f.right_u); },
           "(n,) float32, column in the right image [px]; meaningful where depth > 0.")
       .def_property_readonly(
+          "right_variance", [](const Frame& f) { return to_array(f.right_variance); },
+          "(n,) float32, variance of right columns that were aligned, before the factor of the\n"
+          "noise [px^2], 0 for others; (0,) where nothing was aligned.")
+      .def_property_readonly(
+          "has_images",
+          [](const Frame& f) { return f.images != nullptr && f.images->get() != nullptr; },
+          "Whether the frame still keeps its image pyramids.")
+      .def_property_readonly(
           "depth", [](const Frame& f) { return to_array(f.depth); },
           "(n,) float32, metres; -1 when unknown.")
       .def_property_readonly(
@@ -245,6 +254,16 @@ void bind_tracked_frame(py::module_& module) {
       .def_property_readonly(
           "map_points", [](const TrackedFrame& t) { return to_array(t.map_points); },
           "(n,) int64, ids of the associated map points, -1: none.")
+      .def_property_readonly(
+          "aligned",
+          [](const TrackedFrame& t) {
+            py::array_t<bool> array(static_cast<py::ssize_t>(t.map_points.size()));
+            for (std::size_t i = 0; i < t.map_points.size(); ++i) {
+              array.mutable_at(static_cast<py::ssize_t>(i)) = t.aligned_at(i) != nullptr;
+            }
+            return array;
+          },
+          "(n,) bool, whether a keypoint's point is seen where its patch was aligned.")
       .def_property_readonly(
           "outlier",
           [](const TrackedFrame& t) {
@@ -413,6 +432,30 @@ void bind_frame(py::module_& module) {
       "Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; "
       "a grey image gives none. With the rectifier of a raw pair the image is the raw left one. "
       "Raises ImageError for an image of another size.");
+  module.def(
+      "keep_images",
+      [](Frame& frame, const Extraction& left, const Extraction* right) {
+        FrameImages::Pyramids images{left.pyramid, {}};
+        if (right != nullptr) images.right = right->pyramid;
+        frame.images = std::make_shared<FrameImages>(std::move(images));
+      },
+      py::arg("frame"), py::arg("left"), py::arg("right").none(true) = py::none(),
+      "Keep the image pyramids of a new frame, so that patches can be aligned in them.");
+  module.def(
+      "release_images",
+      [](const Frame& frame) {
+        if (frame.images) frame.images->release();
+      },
+      py::arg("frame"), "Give up the image pyramids of a frame.");
+  module.def(
+      "align_right_columns",
+      [](Frame& frame) {
+        const Camera& camera = *frame.camera;
+        return align_right_columns(frame, camera.bf(), camera.pinhole().fx);
+      },
+      py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
+      "Align the right image of a new stereo frame, which keeps its images, to the left one at\n"
+      "every keypoint with a depth. Returns how many were aligned.");
   module.def(
       "keep_small_image",
       [](Frame& frame, const py::array& grey) {

@@ -11,6 +11,7 @@
 #include "base/scale_pyramid.hpp"
 #include "camera/camera.hpp"
 #include "features/keypoint.hpp"
+#include "frame/frame_images.hpp"
 #include "frame/keypoint_grid.hpp"
 #include "frame/small_image.hpp"
 #include "frame/words.hpp"
@@ -34,6 +35,9 @@ struct Frame {
   /// Red, green, blue of the image at each keypoint; empty when the image was grey.
   std::vector<std::array<std::uint8_t, 3>> colours;
   KeypointGrid grid;
+  /// Of each right column that was aligned (frame/right_alignment.hpp), else 0 [px^2]; may be empty.
+  std::vector<float> right_variance;
+  std::shared_ptr<FrameImages> images;  ///< null: nobody aligns patches in this frame
   SmallImage small_image;  ///< of the image, the left one of a pair; empty when nobody kept it
 
   WordVector words;          ///< filled by describe() (places/), before the frame is shared
@@ -69,6 +73,14 @@ struct Anchor {
   MapIndex map = kNoMap;         ///< KeyFrame::map of it
 };
 
+/// Where a keypoint of a tracked frame sees its map point by the point's patch.
+struct AlignedPixel {
+  MapPointId point;  ///< invalid: not aligned
+  float u = 0, v = 0, right_u = 0;
+  float inverse_sigma2 = 1;  ///< of u and v [px^-2]
+  float right_factor = 1;    ///< inverse variance of the right column over that
+};
+
 /// A frame in the tracker's hands: pose and associations, which change while it is tracked.
 struct TrackedFrame {
   std::shared_ptr<const Frame> frame;
@@ -80,6 +92,9 @@ struct TrackedFrame {
   std::vector<MapPointId> map_points;
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint8_t> outlier;
+  /// Where some keypoints see their points by patches; empty, or one per keypoint. An entry counts
+  /// as long as its keypoint keeps that point.
+  std::vector<AlignedPixel> aligned;
 
   explicit TrackedFrame(std::shared_ptr<const Frame> f)
       : frame(std::move(f)),
@@ -99,6 +114,12 @@ struct TrackedFrame {
     outlier[i] = 0;
   }
   void clear_associations();
+  /// Null where the keypoint, and not its patch, says where the point is seen.
+  const AlignedPixel* aligned_at(std::size_t i) const {
+    const bool is_aligned =
+        !aligned.empty() && aligned[i].point.valid() && aligned[i].point == map_points[i];
+    return is_aligned ? &aligned[i] : nullptr;
+  }
   /// Takes over the associations of another tracked version of the same frame where `keep` is not
   /// 0; all others are dropped. Throws StateError when it is another frame.
   void copy_associations(const TrackedFrame& from, const std::vector<std::uint8_t>& keep);

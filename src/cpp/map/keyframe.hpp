@@ -9,6 +9,7 @@
 #include "base/ids.hpp"
 #include "base/pose.hpp"
 #include "frame/frame.hpp"
+#include "map/point_patch.hpp"
 
 namespace orbslam {
 
@@ -26,6 +27,9 @@ struct KeyFrame {
   double scale = 1;
   std::vector<MapPointId> map_points;  ///< per keypoint: the observed point or an invalid id
 
+  /// Per keypoint what alignment found, or empty. An entry counts while its point is the slot's.
+  std::vector<AlignedSighting> aligned;
+
   /// Number of shared points per neighbour, all neighbours, symmetric.
   std::map<KeyFrameId, int> weights;
   /// Neighbours sharing at least Map::kCovisibilityThreshold points (or the single best one),
@@ -41,6 +45,12 @@ struct KeyFrame {
   bool processed = false;  ///< local mapping has taken it in (process_new_keyframe)
   int leases = 0;          ///< while > 0 a death is deferred (loop closing works on it)
   bool to_be_erased = false;
+
+  /// Null where the keypoint says where the point is seen.
+  const AlignedSighting* aligned_at(std::size_t index, MapPointId point) const {
+    const bool is_aligned = !aligned.empty() && aligned[index].point == point && aligned[index].ok();
+    return is_aligned ? &aligned[index] : nullptr;
+  }
 
   Eigen::Vector3d center() const { return T_cw.center(); }
 };

@@ -181,6 +181,7 @@ void Map::clear() {
   parts_ = {{++last_map_, {}}};
   active_map_ = last_map_;
   big_change_index_ = 0;
+  noise_.forget();
   ++epoch_;
   ++structure_version_;
   ++geometry_version_;

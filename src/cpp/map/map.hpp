@@ -15,6 +15,7 @@
 #include "map/id_table.hpp"
 #include "map/keyframe.hpp"
 #include "map/map_point.hpp"
+#include "map/aligned_noise.hpp"
 
 namespace orbslam {
 
@@ -200,6 +201,18 @@ class Map {
     update_geometry(id);
   }
 
+  // ---- aligned sightings (docs/method/alignment.md) --------------------------------------------
+  /// Sets or takes away (null) the reference sighting of a point; ignores a dead one.
+  void set_patch(MapPointId id, std::shared_ptr<const PointPatch> patch);
+  /// Notes where a keyframe sees the point of a slot; ignores a dead keyframe and a slot that holds
+  /// another point by now.
+  void set_aligned(KeyFrameId id, std::size_t index, const AlignedSighting& sighting);
+  /// Forgets it. The keypoint counts again.
+  void clear_aligned(KeyFrameId id, std::size_t index);
+  /// What is assumed and measured of the noise of aligned sightings. Needs no lock.
+  AlignedNoise& noise() { return noise_; }
+  const AlignedNoise& noise() const { return noise_; }
+
   // ---- covisibility ----------------------------------------------------------------------------
   /// Recounts the shared points of a keyframe with all others, keeps the graph symmetric, and
   /// gives the keyframe its parent (the strongest neighbour that is not its descendant) the first
@@ -270,6 +283,7 @@ class Map {
   MapPointId next_point_{0};
   std::size_t n_published_ = 0;
   std::map<MapIndex, Part> parts_{{0, {}}};  // the active one is among them
+  AlignedNoise noise_;
   MapIndex last_map_ = 0;
   std::atomic<MapIndex> active_map_{0};
   std::atomic<std::uint64_t> epoch_{0}, big_change_index_{0};

@@ -3,10 +3,12 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <memory>
 #include <vector>
 
 #include "base/descriptor.hpp"
 #include "base/ids.hpp"
+#include "map/point_patch.hpp"
 
 namespace orbslam {
 
@@ -58,6 +60,7 @@ struct MapPoint {
   double min_distance = 0;  ///< raw scale range [world units]; gates use 0.8 and 1.2 times
   double max_distance = 0;
   Descriptor descriptor;
+  std::shared_ptr<const PointPatch> patch;  ///< null: no reference sighting
 
   std::vector<Observation> observations;  ///< ascending keyframe id, one per keyframe
   int observation_count = 0;              ///< weighted: 2 per observation with depth, else 1

@@ -2,6 +2,7 @@
 // Map: life of points and the two sides of their observations.
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "base/errors.hpp"
 #include "map/map.hpp"
@@ -136,6 +137,22 @@ void Map::replace_point(MapPointId id, MapPointId by) {
   refresh_descriptor(survivor);
   refresh_geometry(survivor);
   ++structure_version_;
+}
+
+void Map::set_patch(MapPointId id, std::shared_ptr<const PointPatch> patch) {
+  if (MapPoint* owner = points_.find(id)) owner->patch = std::move(patch);
+}
+
+void Map::set_aligned(KeyFrameId id, std::size_t index, const AlignedSighting& sighting) {
+  KeyFrame* observer = keyframes_.find(id);
+  if (!observer || observer->map_points[index] != sighting.point) return;
+  if (observer->aligned.empty()) observer->aligned.resize(observer->map_points.size());
+  observer->aligned[index] = sighting;
+}
+
+void Map::clear_aligned(KeyFrameId id, std::size_t index) {
+  KeyFrame* observer = keyframes_.find(id);
+  if (observer && !observer->aligned.empty()) observer->aligned[index].variance = 0;
 }
 
 void Map::remember_replacement(MapPointId id, MapPointId by) {

@@ -13,7 +13,9 @@ std::uint32_t begin_point(GatheredBundle& bundle, const MapPoint& point) {
 }
 
 void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t point,
-                     const Frame& frame, const Observation& observation) {
+                     const KeyFrame& keyframe, const Observation& observation,
+                     const AlignedNoise& noise) {
+  const Frame& frame = *keyframe.frame;
   const Keypoint& keypoint = frame.keypoints[observation.index];
   BundleProblem::Observation o;
   o.camera = camera;
@@ -23,8 +25,53 @@ void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t
   o.right_u = frame.right_u[observation.index];
   o.inverse_sigma2 = frame.scales->inverse_sigma2(keypoint.level);
   o.has_depth = observation.has_depth;
+  ObservationSource source;
+  const float corner = o.inverse_sigma2;
+  if (const auto* a = keyframe.aligned_at(observation.index, bundle.points[point])) {
+    o.u = a->u;
+    o.v = a->v;
+    o.right_u = a->right_u;
+    o.inverse_sigma2 = noise.weight(noise.position, a->variance, corner);
+    const bool right = a->right_variance > 0;
+    const float right_weight =
+        right ? noise.weight(noise.right, a->right_variance, corner) : corner;
+    o.right_factor = right_weight / o.inverse_sigma2;
+    source.kind = a->reference ? ObservationKind::kReference
+                  : right      ? ObservationKind::kAlignedRight
+                               : ObservationKind::kAligned;
+    source.variance = a->variance;
+    source.right_variance = a->right_variance;
+  }
   bundle.problem.observations.push_back(o);
   bundle.keypoints.push_back(observation.index);
+  bundle.sources.push_back(source);
+}
+
+/// Gives the reference sighting of the point that was added last the mean weight of those that were
+/// aligned to it: it is as exact as they are. Without any its corner counts as one.
+void weigh_reference(GatheredBundle& bundle, const Map& map) {
+  auto& observations = bundle.problem.observations;
+  const std::uint32_t point = static_cast<std::uint32_t>(bundle.points.size() - 1);
+  float sum = 0;
+  int n = 0;
+  BundleProblem::Observation* reference = nullptr;
+  std::size_t i = observations.size();
+  for (; i > 0 && observations[i - 1].point == point; --i) {
+    auto& o = observations[i - 1];
+    if (bundle.sources[i - 1].kind == ObservationKind::kReference) {
+      reference = &o;
+    } else if (bundle.sources[i - 1].kind != ObservationKind::kKeypoint) {
+      sum += o.inverse_sigma2;
+      ++n;
+    }
+  }
+  if (reference == nullptr) return;
+  const std::size_t at = static_cast<std::size_t>(reference - observations.data());
+  const Frame& frame = *map.find(bundle.keyframes[reference->camera])->frame;
+  const float corner = frame.scales->inverse_sigma2(frame.keypoints[bundle.keypoints[at]].level);
+  const float right = reference->right_factor * reference->inverse_sigma2;
+  reference->inverse_sigma2 = n > 0 ? std::max(corner, sum / static_cast<float>(n)) : corner;
+  reference->right_factor = n > 0 ? right / reference->inverse_sigma2 : 1.0F;
 }
 
 }  // namespace
@@ -40,16 +87,17 @@ void GatheredBundle::add_point(const MapPoint& point, const Map& map) {
   for (const orbslam::Observation& observation : point.observations) {
     const auto camera = camera_of.find(observation.keyframe);
     if (camera == camera_of.end()) continue;
-    add_observation(*this, camera->second, slot, *map.find(observation.keyframe)->frame,
-                    observation);
+    add_observation(*this, camera->second, slot, *map.find(observation.keyframe), observation,
+                    map.noise());
   }
+  weigh_reference(*this, map);
 }
 
 void GatheredBundle::add_points(const std::vector<const MapPoint*>& added, const Map& map) {
   // By position in the list of cameras; observations and cameras come in thousands and tens.
   struct Place {
     std::uint32_t camera;
-    const Frame* frame;
+    const KeyFrame* keyframe;
   };
   std::vector<Place> by_id;
   const auto [first, last] = std::minmax_element(keyframes.begin(), keyframes.end());
@@ -58,15 +106,17 @@ void GatheredBundle::add_points(const std::vector<const MapPoint*>& added, const
   const auto lowest = first->value;
   for (std::uint32_t i = 0; i < keyframes.size(); ++i) {
     by_id[static_cast<std::size_t>(keyframes[i].value - lowest)] = {
-        i, map.find(keyframes[i])->frame.get()};
+        i, map.find(keyframes[i])};
   }
   for (const MapPoint* point : added) {
     const std::uint32_t slot = begin_point(*this, *point);
     for (const orbslam::Observation& observation : point->observations) {
       const auto at = static_cast<std::size_t>(observation.keyframe.value - lowest);
-      if (at >= by_id.size() || by_id[at].frame == nullptr) continue;  // lower ones wrap around
-      add_observation(*this, by_id[at].camera, slot, *by_id[at].frame, observation);
+      if (at >= by_id.size() || by_id[at].keyframe == nullptr) continue;  // lower ones wrap around
+      add_observation(*this, by_id[at].camera, slot, *by_id[at].keyframe, observation,
+                      map.noise());
     }
+    weigh_reference(*this, map);
   }
 }
 

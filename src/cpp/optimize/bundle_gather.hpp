@@ -10,6 +10,19 @@
 
 namespace orbslam {
 
+/// What the position of an observation comes from.
+enum class ObservationKind : std::uint8_t {
+  kKeypoint,      ///< the corner
+  kAligned,       ///< the patch of the point; its right column has the noise of the corner
+  kAlignedRight,  ///< the same, and the right column was aligned as well
+  kReference,     ///< the corner at which the patch was cut
+};
+
+struct ObservationSource {
+  ObservationKind kind = ObservationKind::kKeypoint;
+  float variance = 0, right_variance = 0;  ///< that the patches give [pixels^2]
+};
+
 /// Part of a map copied into a BundleProblem, with the ids to find the way back. Filled under the
 /// map's read lock, solved without a lock, committed under the write lock. See
 /// docs/method/adjustment.md#local-bundle-adjustment.
@@ -18,6 +31,7 @@ struct GatheredBundle {
   std::vector<KeyFrameId> keyframes;     ///< per camera of the problem
   std::vector<MapPointId> points;        ///< per point
   std::vector<std::uint32_t> keypoints;  ///< per observation: slot of its keyframe
+  std::vector<ObservationSource> sources;  ///< per observation
   std::uint64_t epoch = 0;               ///< of the map when it was gathered
   std::uint64_t big_changes = 0;         ///< Map::big_change_index() then
   MapIndex map_index = kNoMap;           ///< of a full bundle: the map that it is of

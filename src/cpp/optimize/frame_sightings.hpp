@@ -36,7 +36,7 @@ class FrameSightings {
  private:
   struct Sighting {
     MapPointId point;
-    float u, v, right_u, inverse_sigma2;
+    float u, v, right_u, inverse_sigma2, right_factor;
     bool has_depth;
   };
   struct Sightings {

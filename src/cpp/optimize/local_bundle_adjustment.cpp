@@ -6,6 +6,8 @@
 
 #include "base/sort_unique.hpp"
 #include "optimize/bundle_gather.hpp"
+#include "optimize/gates.hpp"
+#include "optimize/keyframe_alignment.hpp"
 
 namespace orbslam {
 namespace {
@@ -139,6 +141,35 @@ GatheredBundle gather(const Map& map, KeyFrameId current, const InertialKeyframe
   return bundle;
 }
 
+/// Acquits aligned observations beyond their narrow gate whose corner still fits: the match is
+/// right, and the observation stays.
+void acquit_aligned(const GatheredBundle& bundle, const Map& map,
+                    std::vector<std::uint8_t>& outlier) {
+  for (std::size_t i = 0; i < outlier.size(); ++i) {
+    if (outlier[i] == 0 || bundle.sources[i].kind == ObservationKind::kKeypoint) continue;
+    const auto& o = bundle.problem.observations[i];
+    const auto& camera = bundle.problem.cameras[o.camera];
+    const KeyFrame* keyframe = map.find(bundle.keyframes[o.camera]);
+    if (keyframe == nullptr) continue;
+    const Frame& frame = *keyframe->frame;
+    const Keypoint& corner = frame.keypoints[bundle.keypoints[i]];
+    const Eigen::Vector3d p = camera.T_cw * bundle.problem.points[o.point];
+    Eigen::Vector2d error;
+    if (!camera.model->error(p, corner.x, corner.y, error)) continue;
+    if (camera.model->is_flat() && !(p.z() > 0)) continue;
+    double squared = error.squaredNorm();
+    if (o.has_depth) {
+      const float right_u = frame.right_u[bundle.keypoints[i]];
+      const double right = camera.model->right_error(p, error, corner.x, corner.y, right_u);
+      squared += right * right;
+    }
+    const double gate = o.has_depth ? kGateStereo : kGateMono;
+    if (squared * static_cast<double>(frame.scales->inverse_sigma2(corner.level)) <= gate) {
+      outlier[i] = 0;
+    }
+  }
+}
+
 }  // namespace
 
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
@@ -166,10 +197,12 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
   if (map.epoch() != bundle.epoch) return result;
   // Unfinished estimates are no ground for erasing anything.
   if (result.summary.stage_one_done) {
+    acquit_aligned(bundle, map, result.summary.outlier);
     result.n_erased = erase_observations(bundle, result.summary.outlier, map);
   }
   if (moved) write_back(bundle, map);
   if (moved && inertial != nullptr) inertial->take_from(bundle, map);
+  if (result.summary.stage_one_done) measure_noise(bundle, map.noise());
   result.committed = true;
   return result;
 }

@@ -21,6 +21,7 @@ pose_sums::Task task_of(const Group& group, const Camera& camera, const Pose& T_
                        group.v.data(),
                        group.right_u.data(),
                        group.weight.data(),
+                       group.right_factor.data(),
                        !camera.is_pinhole(),
                        {},
                        {},
@@ -67,13 +68,16 @@ const pose_sums::Kernels& kernels() {
 }  // namespace
 
 void Group::clear() {
-  for (auto* values : {&x, &y, &z, &u, &v, &right_u, &inverse_sigma2, &weight}) values->clear();
+  for (auto* values : {&x, &y, &z, &u, &v, &right_u, &inverse_sigma2, &right_factor, &weight}) {
+    values->clear();
+  }
   for (auto& values : sight) values.clear();
   slot.clear();
 }
 
 void Group::push_back(const Eigen::Vector3d& position, double u_px, double v_px, double right_u_px,
-                      double inverse_variance, std::size_t caller_slot) {
+                      double inverse_variance, double right_factor_of_it,
+                      std::size_t caller_slot) {
   x.push_back(position.x());
   y.push_back(position.y());
   z.push_back(position.z());
@@ -81,13 +85,14 @@ void Group::push_back(const Eigen::Vector3d& position, double u_px, double v_px,
   v.push_back(v_px);
   right_u.push_back(right_u_px);
   inverse_sigma2.push_back(inverse_variance);
+  right_factor.push_back(right_factor_of_it);
   weight.push_back(inverse_variance);
   slot.push_back(caller_slot);
 }
 
 void Group::pad() {
   while (x.size() % kLanes != 0) {
-    for (auto* values : {&x, &y, &z, &u, &v, &right_u, &inverse_sigma2}) {
+    for (auto* values : {&x, &y, &z, &u, &v, &right_u, &inverse_sigma2, &right_factor}) {
       values->push_back(values->back());
     }
     for (auto& values : sight) {
@@ -134,7 +139,7 @@ double chi2(const Group& group, std::size_t i, bool stereo, const Camera& camera
       }
       error_r = (q[0] - camera.bf()) / q[2] + (group.u[i] - group.right_u[i]);
     }
-    squared += error_r * error_r;
+    squared += group.right_factor[i] * (error_r * error_r);
   }
   return group.inverse_sigma2[i] * squared;
 }

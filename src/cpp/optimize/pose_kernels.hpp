@@ -20,6 +20,7 @@ struct Group {
   std::vector<double> x, y, z;        ///< world
   std::vector<double> u, v, right_u;  ///< pixels; right_u only in the group with depth
   std::vector<double> inverse_sigma2;
+  std::vector<double> right_factor;          ///< inverse variance of the right column over that
   std::vector<double> weight;                ///< inverse_sigma2 of those in use, 0 of the others
   std::array<std::vector<double>, 9> sight;  ///< by rows; empty for a pinhole
   std::vector<std::size_t> slot;             ///< position in the caller's list
@@ -27,7 +28,7 @@ struct Group {
   std::size_t size() const { return slot.size(); }
   void clear();
   void push_back(const Eigen::Vector3d& position, double u_px, double v_px, double right_u_px,
-                 double inverse_variance, std::size_t caller_slot);
+                 double inverse_variance, double right_factor_of_it, std::size_t caller_slot);
   /// Appends observations of weight 0 up to the next multiple of kLanes.
   void pad();
   /// The sight of the observation that was added last, of a camera that is no pinhole.

@@ -45,7 +45,8 @@ struct Workspace {
   /// False, and nothing added, for a broken number, or a pixel at which the lens shows nothing: it
   /// must not reach the sums.
   bool add(const Camera& camera, const Eigen::Vector3d& position, double u, double v,
-           double right_u, double inverse_sigma2, bool has_depth, std::size_t slot) {
+           double right_u, double inverse_sigma2, bool has_depth, double right_factor,
+           std::size_t slot) {
     if (!position.allFinite() || !std::isfinite(u + v + inverse_sigma2)) return false;
     if (has_depth && !std::isfinite(right_u)) return false;
     Group& group = has_depth ? stereo : mono;
@@ -54,7 +55,7 @@ struct Workspace {
       if (!sight.allFinite()) return false;
       group.push_back(sight);
     }
-    group.push_back(position, u, v, has_depth ? right_u : 0.0, inverse_sigma2, slot);
+    group.push_back(position, u, v, has_depth ? right_u : 0.0, inverse_sigma2, right_factor, slot);
     return true;
   }
   int size() const { return static_cast<int>(mono.size() + stereo.size()); }
@@ -275,9 +276,39 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
 /// Adds what keypoint i is associated with; false, and nothing added, for broken numbers.
 bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
   const Frame& f = *frame.frame;
+  if (const AlignedPixel* a = frame.aligned_at(i)) {
+    return w.add(*f.camera, frame.positions[i], a->u, a->v, a->right_u, a->inverse_sigma2,
+                 f.has_depth(i), a->right_factor, i);
+  }
   const Keypoint& keypoint = f.keypoints[i];
   return w.add(*f.camera, frame.positions[i], keypoint.x, keypoint.y, f.right_u[i],
-               f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), i);
+               f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), 1.0, i);
+}
+
+/// An aligned sighting beyond its narrow gate still shows its point if the keypoint says so.
+/// Returns how many outliers become inliers.
+int acquit_aligned(TrackedFrame& frame) {
+  if (frame.aligned.empty()) return 0;
+  const Frame& f = *frame.frame;
+  int n = 0;
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    if (frame.outlier[i] == 0 || frame.aligned_at(i) == nullptr) continue;
+    const Keypoint& k = f.keypoints[i];
+    const Eigen::Vector3d p = *frame.T_cw * frame.positions[i];
+    Eigen::Vector2d error;
+    if (!f.camera->error(p, k.x, k.y, error)) continue;
+    if (f.camera->is_flat() && !(p.z() > pose_kernels::kTinyDepth)) continue;
+    double squared = error.squaredNorm();
+    if (f.has_depth(i)) {
+      const double right = f.camera->right_error(p, error, k.x, k.y, f.right_u[i]);
+      squared += right * right;
+    }
+    const double gate = f.has_depth(i) ? kGateStereo : kGateMono;
+    if (!(squared * static_cast<double>(f.scales->inverse_sigma2(k.level)) <= gate)) continue;
+    frame.outlier[i] = 0;
+    ++n;
+  }
+  return n;
 }
 
 }  // namespace
@@ -293,7 +324,8 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const PoseObservation& o = observations[i];
     const bool usable =
-        w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
+        w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth,
+              o.right_factor, i);
     estimate.outlier[i] = usable ? 0 : 1;
   }
   run_rounds(w, camera, T_cw_initial, estimate, estimate.outlier.data());
@@ -316,6 +348,7 @@ PoseEstimate optimize_pose(TrackedFrame& frame, const PosePrior* prior) {
   PoseEstimate estimate;
   run_rounds(w, *f.camera, *frame.T_cw, estimate, frame.outlier.data());
   frame.T_cw = estimate.T_cw;
+  estimate.n_inliers += acquit_aligned(frame);
   return estimate;
 }
 

@@ -15,6 +15,7 @@ struct PoseObservation {
   double right_u = 0;         ///< only if has_depth
   double inverse_sigma2 = 1;  ///< of the keypoint's level
   bool has_depth = false;
+  double right_factor = 1;  ///< inverse variance of the right column over that of u and v
 };
 
 /// Gaussian of a pose: `T_cw = exp(e) mean` with `e` (rotation, translation) of mean zero.
@@ -47,7 +48,8 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
                            const std::vector<PoseObservation>& observations,
                            const PosePrior* prior = nullptr);
 
-/// The same for a frame's associations: starts from its pose, and writes its pose and outlier flags
+/// The same for a frame's associations, at their aligned positions where there are some
+/// (TrackedFrame::aligned). An aligned one is an outlier only if its keypoint is one as well. It: starts from its pose, and writes its pose and outlier flags
 /// (of all slots; those without a point get 0). `outlier` of the result stays empty, so that calls
 /// after a thread's first do not allocate. Throws StateError when the frame has no pose.
 PoseEstimate optimize_pose(TrackedFrame& frame, const PosePrior* prior = nullptr);

@@ -26,6 +26,7 @@ struct Task {
   const double* v;
   const double* right_u;  ///< pixels; read in the group with depth alone
   const double* weight;
+  const double* right_factor;  ///< weight of the right column over that of u and v
   bool has_sights;         ///< false: the camera is a pinhole, and u and v say the same
   const double* sight[9];  ///< by rows
   double rotation[9];      ///< R_cw by rows

@@ -80,7 +80,7 @@ inline void add_row(Sums& sums, const Lanes (&jacobian)[kUnknowns], Lanes weight
 /// Adds the rows u, v and, with depth, right u of points at (x, y) on the normalised image plane.
 template <bool kStereo>
 inline void add_points(Sums& sums, Lanes x, Lanes y, Lanes inverse_z, Lanes base,
-                       const Lanes (&errors)[3], Lanes weight_u, Lanes weight_v) {
+                       const Lanes (&errors)[3], Lanes weight_u, Lanes weight_v, Lanes weight_r) {
   const Lanes one = all(1.0), zero = all(0.0), xy = x * y;
   const Lanes row_u[kUnknowns] = {xy, -(one + x * x), y, -inverse_z, zero, x * inverse_z};
   const Lanes row_v[kUnknowns] = {one + y * y, -xy, -x, zero, -inverse_z, y * inverse_z};
@@ -90,7 +90,7 @@ inline void add_points(Sums& sums, Lanes x, Lanes y, Lanes inverse_z, Lanes base
     const Lanes beta = base * inverse_z;
     const Lanes row_right[kUnknowns] = {
         row_u[0] - beta * y, row_u[1] + beta * x, y, -inverse_z, zero, row_u[5] - beta * inverse_z};
-    add_row<4>(sums, row_right, weight_u, errors[2]);
+    add_row<4>(sums, row_right, weight_r, errors[2]);
   }
 }
 
@@ -135,12 +135,13 @@ inline double accumulate_sights(const Task& task, Size first, double* system) {
     // Measurement minus prediction.
     const Lanes error_u = -(B[0] * p.x + B[1] * p.y + B[2] * p.z) * inverse;
     const Lanes error_v = -(B[3] * p.x + B[4] * p.y + B[5] * p.z) * inverse;
-    Lanes error_r = all(0.0);
+    Lanes error_r = all(0.0), factor = one;
     Lanes square = error_u * error_u + error_v * error_v;
     if constexpr (kStereo) {
       const Lanes disparity = load(task.u + i) - load(task.right_u + i);
       error_r = error_u - disparity + bf * inverse;
-      square += error_r * error_r;
+      factor = load(task.right_factor + i);
+      square += factor * (error_r * error_r);
     }
     square *= weight;
     if constexpr (kRobust) {
@@ -160,8 +161,8 @@ inline double accumulate_sights(const Task& task, Size first, double* system) {
                       weight, error_v);
       if constexpr (kStereo) {
         const Lanes by_q = bf * inverse * inverse;
-        add_general_row(sums, p, ua - by_q * B[6], ub - by_q * B[7], uc - by_q * B[8], weight,
-                        error_r);
+        add_general_row(sums, p, ua - by_q * B[6], ub - by_q * B[7], uc - by_q * B[8],
+                        weight * factor, error_r);
       }
     }
   }
@@ -206,11 +207,12 @@ inline double accumulate_lanes(const Task& task, Size first, double* system) {
     const Lanes error_u = (load(task.u + i) - cx) * inverse_fx - x;
     const Lanes error_v = (load(task.v + i) - cy) * inverse_fy - y;
     Lanes error_r = all(0.0);
-    Lanes weight_u = weight * fx2, weight_v = weight * fy2;
+    Lanes weight_u = weight * fx2, weight_v = weight * fy2, weight_r = weight_u;
     Lanes q = weight_u * error_u * error_u + weight_v * error_v * error_v;
     if constexpr (kStereo) {
       error_r = (load(task.right_u + i) - cx) * inverse_fx - x + base * inverse_z;
-      q += weight_u * error_r * error_r;
+      weight_r *= load(task.right_factor + i);
+      q += weight_r * error_r * error_r;
     }
     if constexpr (kRobust) {
       const Mask inside = q <= huber2;
@@ -219,12 +221,13 @@ inline double accumulate_lanes(const Task& task, Size first, double* system) {
       const Lanes scale = inside ? one : width / distance;
       weight_u *= scale;
       weight_v *= scale;
+      weight_r *= scale;
     } else {
       cost += q;
     }
     if constexpr (kSystem) {
       const Lanes errors[3] = {error_u, error_v, error_r};
-      add_points<kStereo>(sums, x, y, inverse_z, base, errors, weight_u, weight_v);
+      add_points<kStereo>(sums, x, y, inverse_z, base, errors, weight_u, weight_v, weight_r);
     }
   }
   if constexpr (kSystem) {

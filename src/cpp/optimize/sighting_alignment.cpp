@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "optimize/sighting_alignment.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "base/errors.hpp"
 #include "base/parallel.hpp"
-#include "features/level_placement.hpp"
 
 namespace orbslam {
 namespace {
 
 /// Median of a chi-square distribution with one degree of freedom.
 constexpr double kMedianOfOne = 0.4549364;
-/// Least standard deviation of an aligned position [pixels of the level]: what interpolation and
-/// the assumed shape of the patch leave.
-constexpr double kLeastDeviation = 0.05;
 /// Observations that a thread takes at a time.
 constexpr std::size_t kChunk = 64;
 
@@ -37,15 +32,6 @@ void check_image(const cv::Mat& image, const Camera& camera, KeyFrameId keyframe
                    " pixels, but its camera has " + std::to_string(size.width) + " x " +
                    std::to_string(size.height) +
                    "; give the 8-bit grey images that the map was made of");
-}
-
-/// Pixels of the image per pixel of the level.
-Eigen::Vector2d scale_of(const LevelPlacement& place) {
-  return {place.x.to_image(1) - place.x.to_image(0), place.y.to_image(1) - place.y.to_image(0)};
-}
-
-Eigen::Vector2d to_level(const LevelPlacement& place, const Eigen::Vector2f& pixel) {
-  return {place.x.to_level(pixel.x()), place.y.to_level(pixel.y())};
 }
 
 }  // namespace
@@ -82,10 +68,8 @@ std::uint32_t SightingAlignment::camera_of(KeyFrameId keyframe) const {
 }
 
 Eigen::Vector2f SightingAlignment::raw_of(std::size_t observation) const {
-  const Frame& frame = frame_of(bundle_.problem.observations[observation]);
-  const auto& keypoints = frame.raw_keypoints.empty() ? frame.keypoints : frame.raw_keypoints;
-  const Keypoint& keypoint = keypoints[bundle_.keypoints[observation]];
-  return {keypoint.x, keypoint.y};
+  return raw_pixel(frame_of(bundle_.problem.observations[observation]),
+                   bundle_.keypoints[observation]);
 }
 
 void SightingAlignment::take_references(KeyFrameId keyframe, const cv::Mat& grey) {
@@ -96,10 +80,7 @@ void SightingAlignment::take_references(KeyFrameId keyframe, const cv::Mat& grey
   for (const std::uint32_t i : seen_by_[camera]) {
     Point& point = points_[bundle_.problem.observations[i].point];
     if (point.reference != i) continue;
-    const int level = frame.keypoints[bundle_.keypoints[i]].level;
-    const LevelPlacement place(*frame.scales, level, frame.camera->image_size());
-    point.has_patch = cut_patch(images.levels[static_cast<std::size_t>(level)],
-                                to_level(place, raw_of(i)), point.patch);
+    point.has_patch = cut_patch_at(frame, bundle_.keypoints[i], images, point.patch);
   }
 }
 
@@ -159,30 +140,11 @@ SightingAlignment::Match SightingAlignment::match(const Point& point, const Fram
   Match result;
   result.tried = true;
   if (!point.surface) return result;
-  const auto warp = warp_of(*point.surface, *frame.camera, T_cw);
-  if (!warp) return result;
   const Frame& from = frame_of(bundle_.problem.observations[point.reference]);
-  const int level_from = from.keypoints[bundle_.keypoints[point.reference]].level;
-  const int level = warped_level(*frame.scales, level_from, warp->A);
-  const LevelPlacement there(*frame.scales, level, frame.camera->image_size());
-  const LevelPlacement here(*from.scales, level_from, from.camera->image_size());
-  const Eigen::Vector2d scale = scale_of(there);
-  const Eigen::Matrix2d A =
-      scale.cwiseInverse().asDiagonal() * warp->A * scale_of(here).asDiagonal();
-  const PatchAlignment aligned =
-      align_patch(point.patch, A, images.levels[static_cast<std::size_t>(level)],
-                  to_level(there, start), options_);
-  result.failure = aligned.failure;
-  if (!aligned.ok()) return result;
-  const Eigen::Vector2f raw(there.x.to_image(static_cast<float>(aligned.position.x())),
-                            there.y.to_image(static_cast<float>(aligned.position.y())));
-  const Eigen::Vector2f pixel = frame.camera->from_image(raw);
-  result.u = pixel.x();
-  result.v = pixel.y();
-  result.level_scale = static_cast<float>(scale.x());
-  const double level_variance = 0.5 * aligned.information.inverse().trace();
-  const double least = kLeastDeviation * kLeastDeviation;
-  result.variance = static_cast<float>((level_variance + least) * scale.x() * scale.x());
+  const int level = from.keypoints[bundle_.keypoints[point.reference]].level;
+  static_cast<FoundPatch&>(result) =
+      find_patch({&point.patch, from.camera.get(), from.scales.get(), level, *point.surface}, frame,
+                 T_cw, images, start, options_);
   return result;
 }
 

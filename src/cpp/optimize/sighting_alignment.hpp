@@ -13,6 +13,7 @@
 #include "features/image_pyramid.hpp"
 #include "frame/frame.hpp"
 #include "optimize/full_bundle_adjustment.hpp"
+#include "optimize/patch_search.hpp"
 
 namespace orbslam {
 
@@ -67,13 +68,9 @@ class SightingAlignment {
 
  private:
   /// What became of a patch in an image.
-  struct Match {
+  struct Match : FoundPatch {  // in the right image u alone is used
     bool tried = false;
-    AlignmentFailure failure = AlignmentFailure::kOutside;
-    float u = 0, v = 0;     ///< undistorted pixels; in the right image u alone is used
-    float variance = 0;     ///< of u and of v, mean of both [pixels^2]
-    float level_scale = 1;  ///< pixels per pixel of the level
-    bool ok() const { return tried && failure == AlignmentFailure::kNone; }
+    bool ok() const { return tried && FoundPatch::ok(); }
   };
   struct Sighting {
     float u = 0, v = 0, right_u = 0, inverse_sigma2 = 0;  ///< as they are in the map

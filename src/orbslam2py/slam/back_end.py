@@ -58,6 +58,8 @@ class BackEnd:
     ) -> None:
         threaded = not options.deterministic
         self.map = core.Map()
+        alignment = config.alignment.for_sensor(sensor)
+        core.assume_alignment_noise(self.map, alignment.noise)
         self.keyframe_index = core.KeyFrameIndex()
         self.events = EventDispatcher(callbacks, threaded=threaded)
         # The other core works on images while mapping goes on, unless these wait for it.
@@ -69,6 +71,7 @@ class BackEnd:
             config.mapping,
             threaded=threaded,
             adjustment_threads=n_threads(2) if images_wait else 1,
+            alignment=alignment,
         )
         self.adjustment = FullBundleAdjustment(
             self.map,

@@ -16,6 +16,7 @@ from typing import Any
 
 from orbslam2py._arguments import is_finite, is_whole, shown
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.sensor import Sensor
 
 #: The numbers of inliers below are for images with so many features or more. Of fewer ones a share
 #: is asked for: fewer points meet fewer keypoints by chance, and fewer can be found of them.
@@ -314,6 +315,45 @@ class TrajectoryConfig:
 
 
 @dataclass(frozen=True)
+class AlignmentConfig:
+    """Which positions are measured by aligning patches of grey values."""
+
+    right_image: bool = False
+    """Align the right image of a stereo pair to the left one at every keypoint with a depth."""
+    new_keyframes: bool = True
+    """Align the sightings of new keyframes and new points before local bundle adjustment, with
+    stereo and RGB-D."""
+    new_keyframes_monocular: bool = False
+    """The same with a single camera."""
+    tracked_inliers: int = 200
+    """Most inliers of a tracked frame that are aligned before its last pose optimization, with
+    stereo and RGB-D; 0: none."""
+    tracked_inliers_monocular: int = 0
+    """The same with a single camera."""
+    noise: float = 0.5
+    """Standard deviation of an aligned sighting over that of a corner; 0: as patches and
+    residuals say, which needs an exact calibration."""
+
+    def for_sensor(self, sensor: Sensor) -> AlignmentConfig:
+        """Return the values in use: those for a single camera take the others' place."""
+        if sensor is Sensor.STEREO:
+            return self
+        changed = replace(self, right_image=False)
+        if sensor.has_depth:
+            return changed
+        return replace(
+            changed,
+            new_keyframes=self.new_keyframes_monocular,
+            tracked_inliers=self.tracked_inliers_monocular,
+        )
+
+    @property
+    def uses_points(self) -> bool:
+        """Whether map points need a patch of their reference sighting."""
+        return self.new_keyframes or self.tracked_inliers > 0
+
+
+@dataclass(frozen=True)
 class Config:
     """All sections of the configuration.
 
@@ -335,6 +375,7 @@ class Config:
     loops: LoopConfig = field(default_factory=LoopConfig)
     merging: MergingConfig = field(default_factory=MergingConfig)
     trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
+    alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Config:
         """Return a configuration with other values.

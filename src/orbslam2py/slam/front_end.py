@@ -45,10 +45,20 @@ class FrontEnd:
         Which images come.
     check_calibration : bool
         Warn if the calibration cannot belong to images of that size.
+    keep_images : bool
+        Frames keep their image pyramids until these are released.
+    align_right : bool
+        Align the right images of pairs to the left ones; needs the images.
     """
 
     def __init__(
-        self, settings: Settings, sensor: Sensor, *, check_calibration: bool = True
+        self,
+        settings: Settings,
+        sensor: Sensor,
+        *,
+        check_calibration: bool = True,
+        keep_images: bool = False,
+        align_right: bool = False,
     ) -> None:
         self._settings = settings
         self._sensor = sensor
@@ -62,6 +72,8 @@ class FrontEnd:
         self._raw_pairs = raw_pairs_of(settings, self._extract_pair)
         self._wide_pair: core.WidePair | None = None
         self._check_calibration = check_calibration
+        self._keep_images = keep_images or align_right
+        self._align_right = align_right
         self._told_depth_size = False
         self.depth_check = DepthCheck(settings.depth_factor)
         self.pair_check = PairCheck()
@@ -95,10 +107,9 @@ class FrontEnd:
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
             extractor = self._extractor_for(feature_factor)
-            frame = core.build_monocular_frame(
-                context, frame_id, timestamp, extractor.extract(grey, mask)
-            )
-            return self._finished(frame, image, grey)
+            extraction = extractor.extract(grey, mask)
+            frame = core.build_monocular_frame(context, frame_id, timestamp, extraction)
+            return self._finished(frame, image, grey, extraction)
 
     def _extractor_for(self, factor: int) -> core.OrbExtractor:
         if factor not in self._extractors:
@@ -154,7 +165,11 @@ class FrontEnd:
                 frame = core.build_stereo_frame(
                     context, frame_id, timestamp, features_left, features_right
                 )
-            return self._finished(frame, left, left_grey, rectifier)
+            extractions = features_left, features_right
+            frame = self._finished(frame, left, left_grey, *extractions, rectifier=rectifier)
+            if self._align_right and self._wide_pair is None:
+                core.align_right_columns(frame)
+            return frame
 
     def _extract_pair(
         self, left: npt.NDArray[np.uint8], right: npt.NDArray[np.uint8]
@@ -192,7 +207,7 @@ class FrontEnd:
             frame = core.build_rgbd_frame(
                 context, frame_id, timestamp, extraction, depth, self._settings.depth_factor
             )
-            return self._finished(frame, image, grey)
+            return self._finished(frame, image, grey, extraction)
 
     def _enlarged(
         self, depth: npt.NDArray[np.generic], image: npt.NDArray[np.uint8]
@@ -217,8 +232,13 @@ class FrontEnd:
         frame: core.Frame,
         image: npt.NDArray[np.uint8],
         grey: npt.NDArray[np.uint8],
+        left: core.Extraction,
+        right: core.Extraction | None = None,
+        *,
         rectifier: core.PairRectifier | None = None,
     ) -> core.Frame:
+        if self._keep_images:
+            core.keep_images(frame, left, right)
         core.keep_small_image(frame, grey)
         if image.ndim == 3:
             core.sample_colours(frame, image, self._settings.camera.rgb, rectifier)

@@ -12,7 +12,7 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.config import MappingConfig
+from orbslam2py.slam.config import AlignmentConfig, MappingConfig
 
 
 class LocalMapping:
@@ -34,6 +34,8 @@ class LocalMapping:
         Of local bundle adjustment, 1 or 2; the result is the same.
     config : MappingConfig
         Limits.
+    alignment : AlignmentConfig or None
+        What is aligned; None: nothing.
     """
 
     def __init__(
@@ -45,6 +47,7 @@ class LocalMapping:
         *,
         threaded: bool,
         adjustment_threads: int = 1,
+        alignment: AlignmentConfig | None = None,
     ) -> None:
         limits = config
         self._map = slam_map
@@ -65,6 +68,7 @@ class LocalMapping:
         self._adjusted_keyframes = limits.adjusted_keyframes
         #: Velocities and biases at keyframes, once an IMU has started.
         self.inertial: core.InertialKeyframes | None = None
+        self._alignment = alignment
         #: Milliseconds per part of the work, over all keyframes.
         self.statistics = StageStatistics()
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
@@ -106,10 +110,23 @@ class LocalMapping:
             if not self.worker.n_waiting:
                 with timer("mapping.fuse"):
                     core.fuse_with_neighbours(self._map, keyframe, self._n_neighbours)
+            self._align(keyframe, timer)
             if self.worker.lower_interrupt():
                 self._refine(keyframe, timer)
         self.statistics.add(timer.milliseconds)
         self.on_done(keyframe)
+
+    def _align(self, keyframe: int, timer: StageTimer) -> None:
+        alignment = self._alignment
+        if alignment is None or not alignment.uses_points:
+            return
+        with timer("mapping.align"):
+            core.align_keyframes(
+                self._map,
+                keyframe,
+                patches_only=not alignment.new_keyframes,
+                n_threads=self._adjustment_threads,
+            )
 
     def _refine(self, keyframe: int, timer: StageTimer) -> None:
         n_keyframes = self._map.n_keyframes_of(self._map.map_of(keyframe))

@@ -34,6 +34,7 @@ from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput, InertialTracker
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
+from orbslam2py.slam.kept_images import KeptImages
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import Setup, SystemOptions
@@ -97,12 +98,18 @@ class Pipeline:
         sensor = setup.sensor
         self._sensor = sensor
         config = options.full_config.for_features(setup.settings.orb.n_features)
+        alignment = config.alignment.for_sensor(sensor)
         self._vocabulary = setup.vocabulary
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images
         self.front_end = FrontEnd(
-            setup.settings, sensor, check_calibration=options.check_calibration
+            setup.settings,
+            sensor,
+            check_calibration=options.check_calibration,
+            keep_images=alignment.uses_points,
+            align_right=alignment.right_image,
         )
+        self._kept_images = KeptImages()
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         #: Uses the IMU in tracking; None without settings of one.
         self.inertial_tracker = _make_inertial(setup, back_end)
@@ -215,6 +222,11 @@ class Pipeline:
                 interval=interval,
             )
         self.statistics.add(timer.milliseconds)
+        self._kept_images.note(
+            frame.features,
+            is_keyframe=outcome.is_keyframe,
+            waiting=outcome.state is not TrackingState.OK or outcome.estimate.unconfirmed,
+        )
 
         if outcome.estimate.unconfirmed:
             self.recorder.doubt(frame)
@@ -410,6 +422,7 @@ def _make_search(
         setup.sensor,
         relocalizer,
         config.tracking,
+        config.alignment.for_sensor(setup.sensor).tracked_inliers,
         pixels_per_radian=setup.settings.camera.pixels_per_radian,
     )
 

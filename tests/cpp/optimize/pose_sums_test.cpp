@@ -27,7 +27,7 @@ std::vector<const pose_sums::Kernels*> all_pose_kernels() {
 
 /// Points before a camera at the origin, and where they would be seen but for some pixels.
 struct Seen {
-  std::vector<double> x, y, z, u, v, right_u, weight;
+  std::vector<double> x, y, z, u, v, right_u, weight, right_factor;
 
   explicit Seen(std::size_t n) {
     std::mt19937_64 random(n);
@@ -39,6 +39,7 @@ struct Seen {
       v.push_back(510 * y[i] / z[i] + 240 + uniform(random, -4, 4));
       right_u.push_back(500 * x[i] / z[i] + 320 - 40 / z[i] + uniform(random, -4, 4));
       weight.push_back(i % 5 == 0 ? 0 : uniform(random, 0.3, 1));
+      right_factor.push_back(i % 3 == 0 ? 1 : uniform(random, 0.1, 3));
     }
   }
   Task task(double huber) const {
@@ -50,6 +51,7 @@ struct Seen {
             v.data(),
             right_u.data(),
             weight.data(),
+            right_factor.data(),
             false,
             {},
             {1, 0, 0, 0, 1, 0, 0, 0, 1},
@@ -68,7 +70,7 @@ struct Seen {
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double e_u = u[i] - (500 * x[i] / z[i] + 320), e_v = v[i] - (510 * y[i] / z[i] + 240);
       const double e_r = right_u[i] - (500 * x[i] / z[i] + 320 - 40 / z[i]);
-      const double q = weight[i] * (e_u * e_u + e_v * e_v + (stereo ? e_r * e_r : 0));
+      const double q = weight[i] * (e_u * e_u + e_v * e_v + (stereo ? right_factor[i] * e_r * e_r : 0));
       const bool inside = huber <= 0 || q <= huber * huber;
       sum += inside ? q : 2 * huber * std::sqrt(q) - huber * huber;
     }

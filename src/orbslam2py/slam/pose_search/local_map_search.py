@@ -62,6 +62,8 @@ class LocalMapSearch:
         What the images come from.
     config : TrackingConfig
         Limits.
+    aligned_inliers : int
+        Most inliers that are aligned to the patches of their points at the end; 0: none.
     """
 
     def __init__(
@@ -69,9 +71,11 @@ class LocalMapSearch:
         slam_map: core.Map,
         sensor: Sensor,
         config: TrackingConfig,
+        aligned_inliers: int = 0,
     ) -> None:
         self._map = slam_map
         self._limits = config
+        self._aligned_inliers = aligned_inliers
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
@@ -102,7 +106,6 @@ class LocalMapSearch:
             window = self._limits.local_map_window_after_relocalization
         matches = core.match_local_map(frame, local_map.points, first.discarded, window)
         optimized = core.optimize_pose(frame)
-        by_image, fused = frame.T_cw, _fused(frame, optimized, state)
         visible = matches.visible
         found_again = just_begun and state.found_again
         if found_again and optimized.n_inliers >= self._limits.map_matches:
@@ -110,6 +113,8 @@ class LocalMapSearch:
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
+        optimized = self._aligned(frame, optimized)
+        by_image, fused = frame.T_cw, _fused(frame, optimized, state)
         estimate = self._enough_found(frame, first, fused or optimized)
         if fused is not None:
             estimate = replace(estimate, by_image=by_image)
@@ -152,6 +157,7 @@ class LocalMapSearch:
             frame.clear_associations()
             visible = core.match_local_map(frame, local_map.points, nothing, window).visible
             optimized = core.optimize_pose(frame)
+        optimized = self._aligned(frame, optimized)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
         elsewhere = in_doubt or _is_elsewhere(frame, refined)
         if optimized.n_inliers < share * n_of_map or not elsewhere:
@@ -160,6 +166,14 @@ class LocalMapSearch:
         if estimate.visual_odometry or not estimate.found:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, len(visible))
+
+    def _aligned(self, frame: core.TrackedFrame, optimized: core.PoseEstimate) -> core.PoseEstimate:
+        """Optimize once more with inliers at the places where patches put them."""
+        enough = optimized.n_inliers >= self._limits.local_map_inliers
+        if not (self._aligned_inliers and enough):
+            return optimized
+        core.align_frame(self._map, frame, self._aligned_inliers)
+        return core.optimize_pose(frame)
 
     def _enough_found(
         self,

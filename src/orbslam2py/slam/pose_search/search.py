@@ -56,6 +56,7 @@ class PoseSearch:
         sensor: Sensor,
         relocalizer: Relocalizer | None,
         config: TrackingConfig,
+        aligned_inliers: int = 0,
         *,
         pixels_per_radian: float = 0.0,
     ) -> None:
@@ -66,7 +67,7 @@ class PoseSearch:
         self.has_depth = sensor.has_depth
         self._relocalizer = relocalizer
         self.limits = config
-        self.local_map_search = LocalMapSearch(slam_map, sensor, config)
+        self.local_map_search = LocalMapSearch(slam_map, sensor, config, aligned_inliers)
 
     @property
     def motion_model_window(self) -> float:

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/frame_alignment.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "optimize/patch_search.hpp"
+
+namespace orbslam {
+namespace {
+
+struct Sighting {
+  std::size_t slot;
+  std::shared_ptr<const PointPatch> patch;
+  Pose T_rw;
+};
+
+/// Inliers whose point has a patch, a part of them where there are more than `most`.
+std::vector<Sighting> sightings_of(const Map& map, const TrackedFrame& frame, std::size_t most) {
+  std::vector<Sighting> all;
+  const auto lock = map.read_lock();
+  for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
+    if (!frame.map_points[i].valid() || frame.outlier[i] != 0) continue;
+    const MapPoint* point = map.find(frame.map_points[i]);
+    if (point != nullptr && point->patch) all.push_back({i, point->patch, Pose()});
+  }
+  std::vector<Sighting> chosen;
+  const std::size_t n = std::min(most, all.size());
+  chosen.reserve(n);
+  std::unordered_map<KeyFrameId, Pose> poses;
+  for (std::size_t k = 0; k < n; ++k) {
+    Sighting& sighting = all[k * all.size() / n];
+    const auto [pose, is_new] = poses.try_emplace(sighting.patch->keyframe);
+    if (is_new) pose->second = map.T_cw(sighting.patch->keyframe);
+    sighting.T_rw = pose->second;
+    chosen.push_back(std::move(sighting));
+  }
+  return chosen;
+}
+
+}  // namespace
+
+AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most) {
+  AlignmentCounts counts{};
+  const Frame& f = *frame.frame;
+  const auto images = f.images ? f.images->get() : nullptr;
+  if (!images || !frame.T_cw) return counts;
+  const std::vector<Sighting> sightings = sightings_of(map, frame, most);
+  frame.aligned.assign(f.size(), AlignedPixel());
+  for (const Sighting& s : sightings) {
+    const PointPatch& patch = *s.patch;
+    const double z = (s.T_rw * frame.positions[s.slot]).z();
+    const auto surface =
+        parallel_patch(*patch.camera, s.T_rw.inverse(), patch.pixel.cast<double>(), z);
+    if (!surface) continue;
+    const FoundPatch found =
+        find_patch({&patch.patch, patch.camera.get(), patch.scales.get(), patch.level, *surface}, f,
+                   *frame.T_cw, images->left, raw_pixel(f, s.slot));
+    ++counts[static_cast<std::size_t>(found.failure)];
+    if (!found.ok()) continue;
+    const Keypoint& keypoint = f.keypoints[s.slot];
+    const float corner = f.scales->inverse_sigma2(keypoint.level);
+    AlignedPixel& pixel = frame.aligned[s.slot];
+    pixel.point = frame.map_points[s.slot];
+    pixel.u = found.u;
+    pixel.v = found.v;
+    pixel.right_u = f.right_u[s.slot] + (found.u - keypoint.x);
+    pixel.inverse_sigma2 = map.noise().weight(map.noise().position, found.variance, corner);
+    const float right = f.right_variance.empty() ? 0 : f.right_variance[s.slot];
+    const float right_weight =
+        right > 0 ? map.noise().weight(map.noise().right, right + found.variance, corner)
+                  : corner;
+    pixel.right_factor = right_weight / pixel.inverse_sigma2;
+  }
+  return counts;
+}
+
+}  // namespace orbslam

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/keyframe_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "base/sort_unique.hpp"
+#include "optimize/patch_search.hpp"
+
+namespace orbslam {
+namespace {
+
+/// Median of a chi-square distribution with one degree of freedom.
+constexpr double kMedianOfOne = 0.4549364;
+/// Sightings that a thread takes at a time.
+constexpr std::size_t kChunk = 64;
+/// Fewest residuals that say something of the noise.
+constexpr std::size_t kFewestResiduals = 100;
+
+/// A keyframe with its images.
+struct View {
+  KeyFrameId keyframe;
+  std::shared_ptr<const Frame> frame;
+  std::shared_ptr<const FrameImages::Pyramids> images;
+  Pose T_cw;
+};
+
+struct Sighting {
+  std::size_t view = 0;
+  std::uint32_t slot = 0;
+  std::size_t point = 0;
+  bool is_new = false;  ///< not tried yet
+  AlignmentFailure failure = AlignmentFailure::kOutside;
+  AlignedSighting result;
+};
+
+struct Point {
+  MapPointId id;
+  Eigen::Vector3d position;
+  std::shared_ptr<const PointPatch> patch;
+  Pose T_rw;  ///< of the patch's keyframe
+  bool is_new = false;
+  std::optional<SurfacePatch> surface;
+};
+
+/// What the map holds of the sightings to be aligned.
+struct Task {
+  std::vector<View> views;
+  std::vector<Point> points;
+  std::vector<Sighting> sightings;  ///< of a point one after the other, the youngest keyframe first
+  std::uint64_t epoch = 0;
+};
+
+std::vector<View> views_of(const Map& map, const KeyFrame& current) {
+  std::vector<KeyFrameId> ids = current.neighbours;
+  ids.push_back(current.id);
+  sort_unique(ids);
+  std::vector<View> views;
+  for (const KeyFrameId id : ids) {
+    const KeyFrame* keyframe = map.find(id);
+    if (keyframe == nullptr || !keyframe->frame->images) continue;
+    if (auto images = keyframe->frame->images->get()) {
+      views.push_back({id, keyframe->frame, std::move(images), keyframe->T_cw});
+    }
+  }
+  return views;
+}
+
+/// Ids of the points with a sighting in these views that was not tried yet.
+std::vector<MapPointId> points_to_align(const Map& map, const std::vector<View>& views) {
+  std::vector<MapPointId> ids;
+  for (const View& view : views) {
+    const KeyFrame& keyframe = *map.find(view.keyframe);
+    for (std::size_t i = 0; i < keyframe.map_points.size(); ++i) {
+      const MapPointId id = keyframe.map_points[i];
+      if (!id.valid()) continue;
+      if (keyframe.aligned.empty() || keyframe.aligned[i].point != id) ids.push_back(id);
+    }
+  }
+  sort_unique(ids);
+  return ids;
+}
+
+Task gather(const Map& map, KeyFrameId current) {
+  Task task;
+  const auto lock = map.read_lock();
+  task.epoch = map.epoch();
+  const KeyFrame* keyframe = map.find(current);
+  if (keyframe == nullptr) return task;
+  task.views = views_of(map, *keyframe);
+  for (const MapPointId id : points_to_align(map, task.views)) {
+    const MapPoint* point = map.find(id);
+    if (point == nullptr) continue;
+    Point added{id, point->position, point->patch, Pose(), false, std::nullopt};
+    if (added.patch) added.T_rw = map.T_cw(added.patch->keyframe);
+    for (std::size_t v = task.views.size(); v-- > 0;) {
+      const Observation* o = point->observation_of(task.views[v].keyframe);
+      if (o == nullptr) continue;
+      Sighting sighting;
+      sighting.view = v;
+      sighting.slot = o->index;
+      sighting.point = task.points.size();
+      const auto& aligned = map.find(o->keyframe)->aligned;
+      sighting.is_new = aligned.empty() || aligned[o->index].point != id;
+      task.sightings.push_back(sighting);
+    }
+    task.points.push_back(std::move(added));
+  }
+  return task;
+}
+
+/// The patch of the youngest sighting that is not too near to a border.
+void cut_missing_patches(Task& task) {
+  for (const Sighting& sighting : task.sightings) {
+    Point& point = task.points[sighting.point];
+    if (point.patch) continue;
+    const View& view = task.views[sighting.view];
+    auto patch = std::make_shared<PointPatch>();
+    if (!cut_patch_at(*view.frame, sighting.slot, view.images->left, patch->patch)) continue;
+    patch->keyframe = view.keyframe;
+    patch->camera = view.frame->camera;
+    patch->scales = view.frame->scales;
+    patch->level = view.frame->keypoints[sighting.slot].level;
+    patch->pixel = raw_pixel(*view.frame, sighting.slot);
+    point.patch = std::move(patch);
+    point.T_rw = view.T_cw;
+    point.is_new = true;
+  }
+}
+
+void align_one(const Task& task, Sighting& sighting) {
+  const Point& point = task.points[sighting.point];
+  if (!point.surface) return;
+  const View& view = task.views[sighting.view];
+  const Frame& frame = *view.frame;
+  const PointPatch& patch = *point.patch;
+  const PlacedPatch placed{&patch.patch, patch.camera.get(), patch.scales.get(), patch.level,
+                           *point.surface};
+  const Keypoint& keypoint = frame.keypoints[sighting.slot];
+  AlignedSighting& result = sighting.result;
+  result.point = point.id;
+  result.reference = patch.keyframe == view.keyframe &&
+                     patch.pixel == raw_pixel(frame, sighting.slot);
+  if (result.reference) {
+    sighting.failure = AlignmentFailure::kNone;
+    result.u = keypoint.x;
+    result.v = keypoint.y;
+    result.variance = static_cast<float>(kLeastAlignedVariance) *
+                      frame.scales->sigma2(keypoint.level);
+  } else {
+    const FoundPatch found = find_patch(placed, frame, view.T_cw, view.images->left,
+                                        raw_pixel(frame, sighting.slot));
+    sighting.failure = found.failure;
+    if (!found.ok()) return;
+    result.u = found.u;
+    result.v = found.v;
+    result.variance = found.variance;
+  }
+  if (!frame.has_depth(sighting.slot)) return;
+  result.right_u = frame.right_u[sighting.slot] + (result.u - keypoint.x);
+  // The disparity stays, with the noise that it has.
+  const float own = frame.right_variance.empty() ? 0 : frame.right_variance[sighting.slot];
+  if (own > 0) result.right_variance = own + (result.reference ? 0 : result.variance);
+}
+
+void commit(const Task& task, bool patches_only, Map& map) {
+  const auto lock = map.write_lock();
+  if (map.epoch() != task.epoch) return;
+  for (const Point& point : task.points) {
+    const MapPoint* living = map.find(point.id);
+    if (point.is_new && living != nullptr && !living->patch) map.set_patch(point.id, point.patch);
+  }
+  if (patches_only) return;
+  for (const Sighting& sighting : task.sightings) {
+    if (!sighting.is_new || !sighting.result.point.valid()) continue;
+    map.set_aligned(task.views[sighting.view].keyframe, sighting.slot, sighting.result);
+  }
+}
+
+double factor_of(std::vector<double>& squares, double lost) {
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::sqrt(*middle / kMedianOfOne * lost);
+}
+
+}  // namespace
+
+KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_only, int n_threads) {
+  KeyframeAlignment result;
+  Task task = gather(map, current);
+  if (task.sightings.empty()) return result;
+  cut_missing_patches(task);
+  for (const Point& point : task.points) result.n_patches += point.is_new ? 1 : 0;
+  if (!patches_only) {
+    for (Point& point : task.points) {
+      if (!point.patch) continue;
+      const double z = (point.T_rw * point.position).z();
+      point.surface = parallel_patch(*point.patch->camera, point.T_rw.inverse(),
+                                     point.patch->pixel.cast<double>(), z);
+    }
+    const std::size_t n = task.sightings.size();
+    for_each_in_parallel((n + kChunk - 1) / kChunk, static_cast<std::size_t>(n_threads),
+                         [&](std::size_t chunk) {
+                           const std::size_t end = std::min(n, (chunk + 1) * kChunk);
+                           for (std::size_t i = chunk * kChunk; i < end; ++i) {
+                             if (task.sightings[i].is_new) align_one(task, task.sightings[i]);
+                           }
+                         });
+    for (const Sighting& s : task.sightings) {
+      if (s.is_new && s.result.point.valid()) ++result.counts[static_cast<std::size_t>(s.failure)];
+    }
+  }
+  commit(task, patches_only, map);
+  return result;
+}
+
+void measure_noise(const GatheredBundle& bundle, AlignedNoise& noise) {
+  const BundleProblem& problem = bundle.problem;
+  std::vector<double> squares, right_squares;
+  double n_residuals = 0;
+  for (std::size_t i = 0; i < problem.observations.size(); ++i) {
+    const auto& o = problem.observations[i];
+    n_residuals += o.has_depth ? 3 : 2;
+    const ObservationSource& source = bundle.sources[i];
+    const bool right_aligned = source.kind == ObservationKind::kAlignedRight;
+    if (source.kind != ObservationKind::kAligned && !right_aligned) continue;
+    const auto& camera = problem.cameras[o.camera];
+    const Eigen::Vector3d p = camera.T_cw * problem.points[o.point];
+    Eigen::Vector2d error;
+    if (!camera.model->error(p, o.u, o.v, error)) continue;
+    const double variance = source.variance;
+    squares.push_back(error.x() * error.x() / variance);
+    squares.push_back(error.y() * error.y() / variance);
+    if (!right_aligned || !o.has_depth) continue;
+    const double right = camera.model->right_error(p, error, o.u, o.v, o.right_u);
+    right_squares.push_back(right * right / static_cast<double>(source.right_variance));
+  }
+  const double n_free = static_cast<double>(problem.cameras.size()) - bundle.n_fixed();
+  const double n_unknowns = 3 * static_cast<double>(problem.points.size()) + 6 * n_free;
+  if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
+  // The adjustment has taken so much of the noise into its unknowns.
+  const double lost = n_residuals / (n_residuals - n_unknowns);
+  noise.position.measure(factor_of(squares, lost));
+  if (right_squares.size() < kFewestResiduals) return;
+  noise.right.measure(factor_of(right_squares, lost));
+}
+
+}  // namespace orbslam

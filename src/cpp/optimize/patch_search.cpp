@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/patch_search.hpp"
+
+#include <Eigen/LU>
+
+#include "features/level_placement.hpp"
+
+namespace orbslam {
+namespace {
+
+/// Pixels of the image per pixel of the level.
+Eigen::Vector2d scale_of(const LevelPlacement& place) {
+  return {place.x.to_image(1) - place.x.to_image(0), place.y.to_image(1) - place.y.to_image(0)};
+}
+
+Eigen::Vector2d to_level(const LevelPlacement& place, const Eigen::Vector2f& pixel) {
+  return {place.x.to_level(pixel.x()), place.y.to_level(pixel.y())};
+}
+
+}  // namespace
+
+FoundPatch find_patch(const PlacedPatch& placed, const Frame& frame, const Pose& T_cw,
+                      const ImagePyramid& images, const Eigen::Vector2f& start,
+                      const AlignmentOptions& options) {
+  FoundPatch result;
+  const auto warp = warp_of(placed.surface, *frame.camera, T_cw);
+  if (!warp) return result;
+  const int level = warped_level(*frame.scales, placed.level, warp->A);
+  const LevelPlacement there(*frame.scales, level, frame.camera->image_size());
+  const LevelPlacement here(*placed.scales, placed.level, placed.camera->image_size());
+  const Eigen::Vector2d scale = scale_of(there);
+  const Eigen::Matrix2d A =
+      scale.cwiseInverse().asDiagonal() * warp->A * scale_of(here).asDiagonal();
+  const PatchAlignment aligned =
+      align_patch(*placed.patch, A, images.levels[static_cast<std::size_t>(level)],
+                  to_level(there, start), options);
+  result.failure = aligned.failure;
+  if (!aligned.ok()) return result;
+  const Eigen::Vector2f raw(there.x.to_image(static_cast<float>(aligned.position.x())),
+                            there.y.to_image(static_cast<float>(aligned.position.y())));
+  const Eigen::Vector2f pixel = frame.camera->from_image(raw);
+  result.u = pixel.x();
+  result.v = pixel.y();
+  result.level_scale = static_cast<float>(scale.x());
+  const double level_variance = 0.5 * aligned.information.inverse().trace();
+  result.variance =
+      static_cast<float>((level_variance + kLeastAlignedVariance) * scale.x() * scale.x());
+  return result;
+}
+
+bool cut_patch_at(const Frame& frame, std::size_t i, const ImagePyramid& images,
+                  ReferencePatch& patch) {
+  const int level = frame.keypoints[i].level;
+  const LevelPlacement place(*frame.scales, level, frame.camera->image_size());
+  return cut_patch(images.levels[static_cast<std::size_t>(level)],
+                   to_level(place, raw_pixel(frame, i)), patch);
+}
+
+}  // namespace orbslam

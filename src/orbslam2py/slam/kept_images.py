@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which frames keep their images for alignment; ``docs/method/alignment.md#images``."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from orbslam2py import _core as core
+
+#: The newest keyframes keep their images: new points are aligned in these.
+_KEYFRAMES = 10
+#: Frames before a map begins: some of them may become keyframes.
+_WAITING = 30
+
+
+class KeptImages:
+    """Releases the images of all frames but the newest keyframes.
+
+    An image pyramid takes three times the memory of its image.
+    """
+
+    def __init__(self) -> None:
+        self._keyframes: deque[core.Frame] = deque()
+        self._waiting: deque[core.Frame] = deque()
+
+    def note(self, frame: core.Frame, *, is_keyframe: bool, waiting: bool) -> None:
+        """Take note of a tracked frame, and release what is no longer needed.
+
+        Parameters
+        ----------
+        frame : Frame
+            The frame.
+        is_keyframe : bool
+            It has become a keyframe.
+        waiting : bool
+            No map has begun, or the frame may become a keyframe later.
+        """
+        if not frame.has_images:
+            return
+        if is_keyframe:
+            self._keyframes.append(frame)
+            if len(self._keyframes) > _KEYFRAMES:
+                core.release_images(self._keyframes.popleft())
+                # The frames that began the map are older than this one.
+                self._release_waiting(0)
+        elif waiting:
+            self._waiting.append(frame)
+            self._release_waiting(_WAITING)
+        else:
+            core.release_images(frame)
+
+    def _release_waiting(self, n_kept: int) -> None:
+        while len(self._waiting) > n_kept:
+            core.release_images(self._waiting.popleft())

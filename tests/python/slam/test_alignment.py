@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Alignment of patches while the map grows: what its switches change, and what they do not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orbslam2py import Sensor, System
+from orbslam2py import _core as core
+from orbslam2py.slam.config import AlignmentConfig
+from orbslam2py.slam.kept_images import KeptImages
+from support.small_sequences import ate, new_system, play
+
+OFF = {
+    "alignment.right_image": False,
+    "alignment.new_keyframes": False,
+    "alignment.tracked_inliers": 0,
+}
+ON = {"alignment.new_keyframes": True, "alignment.tracked_inliers": 200}
+
+
+def played(sensor: Sensor, changes: dict[str, Any], n_frames: int = 40) -> System:
+    system = new_system(sensor, deterministic=True, config=changes)
+    play(system, n_frames)
+    return system
+
+
+def map_of(system: System) -> core.Map:
+    return system._pipeline.back_end.map
+
+
+def test_a_single_camera_has_values_of_its_own() -> None:
+    config = AlignmentConfig(new_keyframes_monocular=True, tracked_inliers_monocular=7)
+    single = config.for_sensor(Sensor.MONOCULAR)
+    assert (single.new_keyframes, single.tracked_inliers) == (True, 7)
+    assert not single.right_image
+    assert config.for_sensor(Sensor.STEREO) == config
+
+
+def test_sightings_are_aligned_where_that_is_switched_on(sensor: Sensor) -> None:
+    with played(sensor, OFF) as system:
+        assert core.count_aligned(map_of(system)) == 0
+    with played(sensor, ON) as system:
+        points = map_of(system).n_points
+        assert core.count_aligned(map_of(system)) > points
+    with played(sensor, OFF | {"alignment.tracked_inliers": 200}) as system:
+        assert core.count_aligned(map_of(system)) == 0  # of frames alone
+
+
+def test_poses_are_more_exact_with_it(sensor: Sensor) -> None:
+    with played(sensor, OFF) as without, played(sensor, ON) as aligned:
+        assert ate(aligned) < 0.8 * ate(without)
+
+
+def test_repeated_runs_are_equal(sensor: Sensor) -> None:
+    with played(sensor, ON) as first, played(sensor, ON) as second:
+        np.testing.assert_array_equal(first.trajectory().T_wc, second.trajectory().T_wc)
+
+
+def test_right_images_are_aligned_where_that_is_switched_on() -> None:
+    changes = OFF | {"alignment.right_image": True}
+    with played(Sensor.STEREO, changes, 3) as system:
+        frame = system._pipeline.tracking.motion.last.features
+        aligned = frame.right_variance > 0
+        assert np.count_nonzero(aligned) > 0.7 * np.count_nonzero(frame.depth > 0)
+    with played(Sensor.STEREO, OFF, 3) as system:
+        assert len(system._pipeline.tracking.motion.last.features.right_variance) == 0
+
+
+def test_only_the_newest_keyframes_keep_their_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Frame:
+        has_images = True
+
+    def release(frame: Frame) -> None:
+        frame.has_images = False
+
+    monkeypatch.setattr(core, "release_images", release)
+    kept = KeptImages()
+    waiting, plain = Frame(), Frame()
+    kept.note(waiting, is_keyframe=False, waiting=True)  # type: ignore[arg-type]
+    kept.note(plain, is_keyframe=False, waiting=False)  # type: ignore[arg-type]
+    assert waiting.has_images
+    assert not plain.has_images
+    keyframes = [Frame() for _ in range(12)]
+    for frame in keyframes:
+        kept.note(frame, is_keyframe=True, waiting=False)  # type: ignore[arg-type]
+    assert [frame.has_images for frame in keyframes] == [False] * 2 + [True] * 10
+    assert not waiting.has_images
+
+
+def test_frames_keep_no_images_without_alignment() -> None:
+    with played(Sensor.RGBD, OFF, 3) as system:
+        assert not system._pipeline.tracking.motion.last.features.has_images
