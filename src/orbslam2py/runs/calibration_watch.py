@@ -57,7 +57,7 @@ class CalibrationWatch:
     settings : Settings
         The calibration that is used.
     sensor : Sensor
-        What the images come from.
+        The sensor.
     known : Settings, optional
         The calibration that comes with the images, if one does.
     in_background : bool

@@ -36,7 +36,7 @@ class RunOptions:
     """
 
     sensor: Sensor
-    """What the images come from."""
+    """The sensor."""
     system: SystemOptions = field(default_factory=SystemOptions)
     """How the system works. Recorded images always wait for mapping, unless `realtime` is asked
     for; a camera's never do."""
@@ -58,7 +58,7 @@ class RunOptions:
     initial_pose: FloatArray | None = None
     """Where in the loaded map the camera may be, (4, 4) camera to world."""
     allow_other_setup: bool = False
-    """Load the map although it was made with another camera or other visual words."""
+    """Load the map even if it was made with another camera or vocabulary."""
     save_map: Path | None = None
     """Save the maps in this file at the end."""
     autosave: float | None = None

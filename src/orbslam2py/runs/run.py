@@ -86,7 +86,7 @@ def run_sequence(
     options : RunOptions, optional
         Which frames, and how; all of them with the sequence's sensor if None.
     vocabulary : Vocabulary or path, optional
-        Visual words; the one shipped with the package if None.
+        Visual words; None: the vocabulary of the package.
     output : str or Path, optional
         Folder for the results; nothing is written if None.
     force : bool

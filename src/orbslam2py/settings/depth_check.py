@@ -59,7 +59,7 @@ class DepthCheck:
 
     @property
     def done(self) -> bool:
-        """Whether nothing further needs to be looked at."""
+        """Whether the check is finished."""
         return self._left == 0 or self._chances == 0
 
     @property

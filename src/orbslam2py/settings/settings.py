@@ -190,7 +190,7 @@ class Settings:
         Parameters
         ----------
         path
-            The file; replaced only when everything was written.
+            The file; replaced only after everything is written.
 
         Raises
         ------

@@ -65,7 +65,7 @@ class FrontEnd:
 
     @property
     def depth_warning(self) -> str | None:
-        """Why depth will be wrong, as the first images say: its factor, or pairs that are none."""
+        """Return why depth will be wrong: the depth factor, or equal images of a pair."""
         return self.depth_check.warning or self.pair_check.warning
 
     def reset(self) -> None:
@@ -243,7 +243,7 @@ class FrontEnd:
 
 
 def _size_text(image: npt.NDArray[np.generic]) -> str:
-    """Width and height, as people write them."""
+    """Width and height as text."""
     return f"{image.shape[1]}x{image.shape[0]}"
 
 

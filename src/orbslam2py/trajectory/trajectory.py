@@ -120,7 +120,7 @@ class Trajectory(EqualByValue, MadeAgainByCopies):
         Parameters
         ----------
         path
-            The file; replaced only when everything was written.
+            The file; replaced only after everything is written.
         format
             ``"tum"``: time, position and quaternion of every pose that is not lost. ``"kitti"``:
             the upper three rows of ``T_wc``, one line per frame; the identity before the first

@@ -79,7 +79,7 @@ def write_tum(
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     trajectory
         Poses; positions and quaternions (camera to world) get 9 decimals.
     timestamp_texts
@@ -115,7 +115,7 @@ def write_kitti(path: str | Path, trajectory: TimedPoses, n_frames: int | None =
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     trajectory
         Poses with the numbers of their frames in `Trajectory.indices`.
     n_frames
@@ -160,7 +160,7 @@ def write_euroc(
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     trajectory
         Poses; positions and quaternions get 9 decimals.
     timestamp_texts
