@@ -51,7 +51,7 @@ def require_dask() -> Any:
     Raises
     ------
     SettingsError
-        If it is not installed, with the line that installs it.
+        If it is not installed, with the command that installs it.
     """
     try:
         return importlib.import_module("distributed")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From what a user names to images: a folder, a bag, a video or a camera."""
+"""Opens the user's input: a folder, a bag, a video or a camera."""
 
 from __future__ import annotations
 
@@ -52,38 +52,38 @@ def open_input(
     Parameters
     ----------
     source
-        Folder of a sequence in a layout that `open_sequence` knows, folder of images, folder with a
-        folder of images and one of depth, or with images of a left and a right camera (two folders,
-        or two series of images), bag of ROS 1 or ROS 2 (file or folder), video file, or number of a
-        camera (also as text, if there is no file of that name).
+        One of: the folder of a sequence in a layout that `open_sequence` knows; a folder of images;
+        a folder with images and depth in two folders; a folder with images of a left and a right
+        camera (two folders or two series); a bag of ROS 1 or ROS 2 (file or folder); a video file;
+        the number of a camera (also as text, if no file has this name).
     sensor
-        What to deliver images for; by default the richest there is.
+        The sensor; by default the richest one that there are images for.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
     fps
-        Images per second of a folder of images or a video; the rate a camera is asked for.
+        Images per second of a folder of images or a video; the requested rate of a camera.
     times
-        File with one time stamp per image of a folder of images or a video: decimal seconds or
-        whole nanoseconds, with the images' file names or without.
+        File with one time stamp for each image of a folder or a video: decimal seconds or whole
+        nanoseconds, with or without the names of the images.
     mask
-        An image file, 0 where no keypoint may lie, or a folder with one per image.
+        An image file, with no keypoints where it is 0, or a folder with one for each image.
     topics
-        Of a bag: which topics are the images, as `BagSequence` takes them.
+        For a bag: the topics of the images, as `BagSequence` takes them.
     split
-        Of a folder of images, a video or a camera: whether every image holds the left view in its
-        left half and the right view in its right half.
+        For a folder of images, a video or a camera: whether the left and right half of every image
+        are the left and right view.
 
     Returns
     -------
     IterableSequence or LiveSource
-        A `LiveSource`, opened already, for a camera.
+        An opened `LiveSource` for a camera.
 
     Raises
     ------
     DatasetError
-        If there is nothing of that name, or it has no images for the sensor.
+        If there is no such input, or it has no images for the sensor.
     SettingsError
-        If there are no settings, or they are wrong.
+        If there are no settings, or they are invalid.
     ImageError
         If the mask is no readable image.
     """
@@ -173,7 +173,7 @@ def _refuse_topics(source: object, topics: Mapping[str, str] | str | None) -> No
 
 
 def _require_video(path: Path) -> None:
-    """Say what a file is that cannot be a video by its name; what has no known name is tried."""
+    """Return the kind of a file if its name says that it is no video."""
     ending = path.suffix.lower()
     for endings, what, option in _OTHER_FILES:
         if ending in endings:
@@ -193,7 +193,7 @@ def _require_video(path: Path) -> None:
 
 
 def _refuse_half_of_pair(path: Path, sensor: Sensor | str | None) -> None:
-    """Name the folder above if one of the two folders of a pair is given for RGB-D or stereo."""
+    """Name the parent folder if the user gives only one of the two folders."""
     wanted = None if sensor is None else Sensor(sensor)
     here, above = path.resolve(), path.resolve().parent
     if wanted in (None, Sensor.MONOCULAR) or has_layout(above):

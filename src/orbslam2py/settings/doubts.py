@@ -24,7 +24,7 @@ def find_doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
     Parameters
     ----------
     sensor
-        What the settings are for.
+        The sensor of the settings.
     groups
         The settings.
     """
