@@ -79,7 +79,7 @@ def write_figure(path: str | PathLike[str], figure: Figure, *, dpi: float | None
     Raises
     ------
     OutputFileError
-        If the ending is that of no format of pictures that is known here.
+        If the suffix is of no known format of pictures.
     OSError
         If the file cannot be written.
     """

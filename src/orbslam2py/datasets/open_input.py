@@ -173,7 +173,7 @@ def _refuse_topics(source: object, topics: Mapping[str, str] | str | None) -> No
 
 
 def _require_video(path: Path) -> None:
-    """Return the kind of a file if its name says that it is no video."""
+    """Refuse a file if its name says that it is no video."""
     ending = path.suffix.lower()
     for endings, what, option in _OTHER_FILES:
         if ending in endings:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Raw stereo pairs as ORB-SLAM3 and stella_vslam describe them, and their rectification."""
+"""Raw stereo pairs in the formats of ORB-SLAM3 and stella_vslam, and their rectification."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ RECTIFIER_KEYS = tuple(
 
 @dataclass(frozen=True)
 class RawPair:
-    """How a raw pair is rectified, and what the rectified cameras are.
+    """The rectification of a raw pair, and its rectified cameras.
 
     Attributes
     ----------
@@ -50,21 +50,21 @@ class RawPair:
 def rectified_pair(
     entries: Mapping[str, Entry], second: Mapping[str, Entry], problems: list[Problem]
 ) -> RawPair | None:
-    """Find the rectification of a pair with its pose, as ORB-SLAM3 1.0 tells it.
+    """Compute the rectification of a pair by its relative pose, as in files of ORB-SLAM3 1.0.
 
     Parameters
     ----------
     entries
-        Those of the file by our names: the first camera and the size of the images.
+        The entries of the file by our names: the first camera and the size of the images.
     second
         ``Camera2.*`` and ``Stereo.T_c1_c2``.
     problems
-        Takes what is wrong, except with the first camera, which is read elsewhere.
+        Gets the errors, except those of the first camera, which is read elsewhere.
 
     Returns
     -------
     RawPair or None
-        None if something is wrong.
+        None if there is an error.
     """
     line = min(entry.line for entry in second.values())
     wanted = (*(f"Camera2.{name}" for name in _INTRINSICS), RELATIVE_POSE)
@@ -113,9 +113,9 @@ def rectified_pair(
 def stella_pair(
     entries: Mapping[str, Entry], given: Mapping[str, Entry], problems: list[Problem]
 ) -> RawPair | None:
-    """Read the rectification that stella_vslam's ``StereoRectifier`` tells; see `rectified_pair`.
+    """Read the rectification of stella_vslam's ``StereoRectifier``; see `rectified_pair`.
 
-    The first camera is the rectified one there.
+    The first camera of such a file is the rectified one.
     """
     line = min(entry.line for entry in given.values())
     missing = [name for name in RECTIFIER_KEYS if name not in given]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long the stages took: their distributions, and how many frames were in time."""
+"""Times of the stages: their distributions, and how many frames were in time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HEIGHT = 200.0
 
 
 def stage_table(frames: Frames) -> Markup:
-    """Distribution of every stage of tracking: whiskers, quartiles, median, and figures."""
+    """Return the distribution of every stage of tracking: quartiles, median, and figures."""
     rows = {name: frames.milliseconds.get(name) for name in (*STAGES, "track")}
     times = {
         name: ms[np.isfinite(ms)]
@@ -69,7 +69,7 @@ def _box(ms: FloatArray, most: float, look: str) -> Markup:
 
 
 def background_table(report: dict[str, Any]) -> Markup | None:
-    """Times of what runs beside tracking, from report.json; None without any."""
+    """Return the times of the other threads, from report.json; None without any."""
     rows: list[list[str | Markup]] = [
         [join(element("b", name), element("small", STAGES_BESIDE.get(name, ""))),
          *(short(float(numbers[key])) for key in ("median", "mean", "p99")),
@@ -84,7 +84,7 @@ def background_table(report: dict[str, Any]) -> Markup | None:
 
 
 def histogram(frames: Frames) -> Markup | None:
-    """How long the track calls took, and how many of them are within the time between images."""
+    """Return the duration of track calls, and the share within the time between images."""
     ms = frames.milliseconds.get("track", np.zeros(0))
     ms = ms[np.isfinite(ms)]
     if not len(ms) or not ms.any():
