@@ -100,7 +100,8 @@ def align(
     points, targets
         float64 (n, 3), at least one.
     with_scale
-        Whether lengths may change. They do not if all points of a set are at one position, because the scale is unknown then.
+        Whether lengths may change. They do not if all points of a set are at one position, because
+        the scale is unknown then.
     on_a_line
         Whether one of the sets counts as a straight line, about which the rotation is unknown; by
         default if it is one up to rounding. Then the smallest rotation of the line is used; for a

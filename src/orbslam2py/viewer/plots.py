@@ -42,7 +42,7 @@ class LastMinute:
         self._rows.append((seen, inliers, total, *milliseconds))
 
     def table(self, now: float | None = None) -> FloatArray:
-        """Return the figures by image (n, 8): seconds (0 is now), inliers, ms in total, by stage."""
+        """Return figures by image (n, 8): seconds (0 is now), inliers, ms in total, by stage."""
         rows = np.array(self._rows) if self._rows else np.zeros((0, 3 + len(STAGES)))
         rows[:, 0] -= time.perf_counter() if now is None else now
         return rows[rows[:, 0] > -SPAN]

@@ -158,7 +158,7 @@ class PoseValidator:
 
 
 def statistics_of(refined: RefinedPose) -> PoseStatistics:
-    """Return the numbers of a pose that the running means of the scene use."""
+    """Return the numbers of a pose for the running means of the scene."""
     estimate = refined.estimate
     n_inliers = estimate.n_inliers
     return PoseStatistics(
