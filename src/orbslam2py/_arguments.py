@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What callers give, checked where it comes in: a wrong type gets an error that says what to give.
+"""Checks of arguments at the interface: a wrong type gets an error with the remedy.
 
-Without, it would surface deep inside, as a bare `TypeError` about a thing nobody has named.
+Otherwise the error would appear deep inside, as a bare `TypeError` about an unknown object.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _Member = TypeVar("_Member", bound=Enum)
 
 
 def shown(value: object) -> str:
-    """Say what a value is, in a few words for a message: ``None``, ``a dict``, ``'abc'``."""
+    """Describe a value in a few words for a message: ``None``, ``a dict``, ``'abc'``."""
     if value is None or isinstance(value, bool | numbers.Number | str):
         try:
             text = repr(value)
@@ -44,17 +44,17 @@ def shown(value: object) -> str:
 
 
 def is_whole(value: object) -> bool:
-    """Whether a value is a whole number, Python's or NumPy's; True and False are none."""
+    """Return whether a value is a whole number, Python's or NumPy's, but not True or False."""
     return isinstance(value, numbers.Integral) and not isinstance(value, bool)
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a real number, Python's or NumPy's; True and False are none."""
+    """Return whether a value is a real number, Python's or NumPy's, but not True or False."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 def float_of(value: Any) -> float:
-    """Convert a number; what no float can hold, such as ``10**400``, becomes infinite."""
+    """Convert a number; a number that no float can hold, such as ``10**400``, becomes infinite."""
     try:
         return float(value)
     except OverflowError:
@@ -62,7 +62,7 @@ def float_of(value: Any) -> float:
 
 
 def is_finite(value: object) -> bool:
-    """Whether a value is a real number that a float can hold."""
+    """Return whether a value is a real number that a float can hold."""
     return is_number(value) and math.isfinite(float_of(value))
 
 
@@ -72,7 +72,7 @@ def choice_of(value: Any, what: str) -> bool:
     Raises
     ------
     SettingsError
-        For anything else: the text ``"no"`` would count as true.
+        For any other object: the text ``"no"`` would count as true.
     """
     if not isinstance(value, bool | np.bool_):
         raise SettingsError(f"{what} is {shown(value)}; give True or False")
@@ -82,7 +82,7 @@ def choice_of(value: Any, what: str) -> bool:
 def member_of(
     names: type[_Member], value: object, what: str, error: type[OrbSlamError] = DatasetError
 ) -> _Member:
-    """Take a member of an enumeration whose values are names, or the name of one.
+    """Take a member of an enumeration, or the name of one.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def member_of(
     what
         What it is called.
     error
-        Raised for anything else, with all names.
+        For any other object; the message lists all names.
     """
     if isinstance(value, str) and value in {one.value for one in names}:
         return names(value)
@@ -102,12 +102,12 @@ def member_of(
 
 
 def index_of(value: Any, length: int) -> int:
-    """Take the place of a frame in a sequence.
+    """Check the number of a frame in a sequence.
 
     Raises
     ------
     DatasetError
-        For anything but a whole number.
+        For an object that is no whole number.
     IndexError
         If there is no such frame.
     """
@@ -129,7 +129,7 @@ def finite_number(
     value
         What was given.
     what, remedy
-        What it is called, and what to give, for the message.
+        Its name, and the remedy, for the message.
     error
         Raised for anything else.
     """
@@ -154,7 +154,7 @@ def instance_of(
     kind
         The class.
     what, remedy
-        What it is called, and what to give, for the message.
+        Its name, and the remedy, for the message.
     error
         Raised for anything else.
     """
@@ -179,7 +179,7 @@ def seed_of(value: Any, what: str = "seed", most: int = LARGEST_SEED) -> int:
     Raises
     ------
     SettingsError
-        For anything else, also for True and for 1.0.
+        For any other object, also for True and for 1.0.
     """
     if not is_whole(value) or not 0 <= value <= most:
         raise SettingsError(f"{what} is {shown(value)}; give a whole number from 0 to {most}")
@@ -187,7 +187,7 @@ def seed_of(value: Any, what: str = "seed", most: int = LARGEST_SEED) -> int:
 
 
 def patience_of(timeout: Any) -> float | None:
-    """Take seconds to wait at most; None waits for ever.
+    """Take a waiting time in seconds; None means no limit.
 
     Raises
     ------
@@ -211,7 +211,7 @@ _REMEDIES = {
 
 
 def cannot_open(path: object, error: OSError, what: str = "") -> str:
-    """Say that a file cannot be read, why, and what to do about it."""
+    """Return a message: which file cannot be read, why, and the remedy."""
     named = f"{what} {path}" if what else f"{path}"
     remedy = _REMEDIES.get(error.errno or 0, "give another file")
     return f"cannot open {named}: {error.strerror or error}; {remedy}"
@@ -223,7 +223,7 @@ def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> 
     Raises
     ------
     error
-        For anything else, and for text that no file can be called.
+        For any other object, and for text that cannot be the name of a file.
     """
     path = value if isinstance(value, str) else _text_of(value)
     if path is None:
@@ -243,12 +243,12 @@ def _text_of(value: object) -> str | None:
 def numbers_of(
     value: Any, what: str, error: type[OrbSlamError] = DatasetError, wanted: str = ""
 ) -> npt.NDArray[np.float64]:
-    """Take an array of numbers of any shape, float64; lists of numbers will do.
+    """Take an array of numbers of any shape, float64; lists of numbers are allowed.
 
     Raises
     ------
     error
-        For anything else, naming the wanted shape if it is given.
+        For any other object; the message names the required shape, if it is given.
     """
     try:
         array = np.asarray(value)
@@ -273,11 +273,11 @@ def array_of(
     Parameters
     ----------
     value
-        What was given; lists of numbers will do.
+        The object; lists of numbers are allowed.
     what
         What it is called.
     shape
-        What it must have; -1 allows any length.
+        Required shape; -1 allows any length.
     error
         Raised for anything else.
     finite
@@ -303,7 +303,7 @@ def array_of(
 
 
 def are_poses(T: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Tell which transforms (n, 4, 4) are rigid ones: finite, and with a rotation, no mirror."""
+    """Return which transforms (n, 4, 4) are rigid: finite, with a rotation, without reflection."""
     finite = np.asarray(np.isfinite(T).all(axis=(1, 2)))
     T = T.copy()
     T[~finite] = 0.0
@@ -323,7 +323,7 @@ def pose_of(
     Raises
     ------
     error
-        For anything else, also for a mirror or a change of scale.
+        For any other object, also for a reflection or a change of scale.
     """
     T = array_of(value, what, (4, 4), error)
     if not are_poses(T[None])[0]:
@@ -335,5 +335,5 @@ def pose_of(
 
 
 def number_of(count: int, noun: str) -> str:
-    """A count with its noun: ``1 frame``, ``2 frames``."""
+    """Return a count with its noun: ``1 frame``, ``2 frames``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of the array types that signatures share, and records that hold arrays.
+"""Names of array types for signatures, and records that contain arrays.
 
-The names tell the type of the elements; shapes, units and frames stand where an array is
-described.
+The names give the type of the elements; shapes, units and frames are in the description of each
+array.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ ByteArray = NDArray[np.uint8]
 
 
 class EqualByValue:
-    """Gives a dataclass with arrays, made with ``eq=False``, what the usual one has without.
+    """Adds equality and hash to a dataclass with arrays that has ``eq=False``.
 
-    Two records are equal if all their fields are, arrays number by number; NaN equals NaN, so that
-    a copy is equal. The hash is of those fields only that cannot be changed: no arrays, no dicts.
+    Two records are equal if all their fields are, arrays element by element; NaN equals NaN, so
+    that a copy is equal. The hash uses only immutable fields: no arrays, no dicts.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -45,10 +45,10 @@ class EqualByValue:
 
 
 class MadeAgainByCopies:
-    """Gives a dataclass copies and pickles that are made as the record was, from its fields.
+    """Lets copies and pickles of a dataclass be created from its fields, like the record itself.
 
-    So they are checked, and their arrays are read-only where it makes them so, which no array is
-    that comes out of a pickle.
+    So they are checked, and their arrays become read-only, which unpickled arrays are not
+    otherwise.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One call at a time: for objects that are used from several threads, but not at once."""
+"""One call at a time: for objects used from several threads, but not concurrently."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CallGuard:
             self._lock.release()
 
     def wait_until_left(self, timeout: float | None = None) -> bool:
-        """Wait until no other thread is in the call; False when `timeout` seconds passed first."""
+        """Wait until no other thread is in the call; False if `timeout` seconds are over first."""
         if self._owner == threading.get_ident():
             return True
         if not self._lock.acquire(timeout=-1 if timeout is None else timeout):

@@ -20,15 +20,15 @@ def n_cores() -> int:
 
 
 def n_threads(most: int) -> int:
-    """Number of threads for work that can be divided: at most one a core, and at most `most`.
+    """Return a number of threads for divisible work: at most one per core, and at most `most`.
 
-    ``OMP_NUM_THREADS`` says what is wanted, here as for most libraries; a batch sets it in its
-    workers, each of which has one core.
+    ``OMP_NUM_THREADS`` limits it, as in most libraries; a batch sets it in its workers, which have
+    one core each.
 
     Parameters
     ----------
     most : int
-        As many can share the work.
+        Largest number of threads that can share the work.
     """
     wanted = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # one per nested level
     limit = int(wanted) if wanted.isdecimal() and int(wanted) > 0 else most
@@ -38,15 +38,15 @@ def n_threads(most: int) -> int:
 def side_by_side(work: Callable[[_Item], _Result], items: Iterable[_Item]) -> list[_Result]:
     """Call ``work(item)`` for all items in as many threads as `n_threads` gives.
 
-    No `concurrent.futures.ThreadPoolExecutor`: it takes no work any more once the main thread has
-    ended, though another one may still deliver images.
+    It does not use `concurrent.futures.ThreadPoolExecutor`, which takes no work after the end of
+    the main thread, although another thread may still deliver images.
 
     Parameters
     ----------
     work
-        What is done; in several threads at a time.
+        The function; called in several threads at a time.
     items
-        To be worked on, each once.
+        Arguments, each used once.
 
     Returns
     -------

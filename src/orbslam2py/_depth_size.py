@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Depth images that are smaller than the images they belong to, as of phones with a LiDAR."""
+"""Depth images that are smaller than their colour images, as from phones with a LiDAR."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _MOST_TIMES_SMALLER = 16
 
 
 def depth_size_problem(depth: tuple[int, ...], image: tuple[int, ...]) -> str | None:
-    """Tell why depth cannot be brought to the size of its image; None if it can.
+    """Return why depth cannot be resized to its image; None if it can.
 
     Parameters
     ----------
     depth, image
-        Shapes: rows, columns, and what follows.
+        Shapes: rows, columns, and further dimensions.
     """
     (h, w), (H, W) = depth[:2], image[:2]
     sizes = f"depth has size {w}x{h}, the image {W}x{H}"
@@ -39,9 +39,9 @@ def depth_size_problem(depth: tuple[int, ...], image: tuple[int, ...]) -> str | 
 
 
 def enlarged_depth(depth: NDArray[np.generic], image: tuple[int, ...]) -> NDArray[np.generic]:
-    """Give every pixel of an image the depth (h, w) of the pixel that covers its centre.
+    """Give every pixel of an image the depth (h, w) of the depth pixel that covers its centre.
 
-    OpenCV's ``INTER_NEAREST_EXACT`` may take the other pixel if a centre is on the border of two,
+    OpenCV's ``INTER_NEAREST_EXACT`` may choose the other pixel if a centre is on the border of two,
     as in an enlargement from 192 to 1440 rows.
 
     Parameters

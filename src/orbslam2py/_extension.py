@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loads the compiled part of the package, and says in words why it cannot be loaded."""
+"""Loads the compiled part of the package, and explains failures."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ _REMEDY = (
 
 
 def missing_instructions(cpuinfo: str) -> list[str]:
-    """Name what the compiled part uses and a processor lacks.
+    """Return the instructions that the compiled part needs and a processor does not have.
 
     Parameters
     ----------
     cpuinfo
-        The text of /proc/cpuinfo. Without a line of flags nothing is known to be missing.
+        The text of /proc/cpuinfo. Without a line of flags, none is reported as missing.
     """
     for line in cpuinfo.splitlines():
         key, _, value = line.partition(":")
@@ -47,7 +47,7 @@ def missing_instructions(cpuinfo: str) -> list[str]:
 
 
 def _first_processor() -> str:
-    """Read the part of /proc/cpuinfo that describes the first processor; nothing elsewhere."""
+    """Return the description of the first processor in /proc/cpuinfo; empty on other systems."""
     try:
         with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as lines:
             text = ""
@@ -66,10 +66,10 @@ def load() -> ModuleType:
     Raises
     ------
     ImportError
-        Saying what is missing: instructions of the processor, a module for this Python and this
-        machine, or a library of the system.
+        The message says what is missing: instructions of the processor, a module for this Python
+        and this machine, or a library of the system.
     KeyboardInterrupt
-        On Ctrl-C, also where loading was what it interrupted.
+        On Ctrl-C, also if it interrupted the loading.
     """
     machine = platform.machine()
     if machine in ("x86_64", "AMD64") and (lacking := missing_instructions(_first_processor())):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of Matplotlib as files: the format that a name asks for, and letters of every script."""
+"""Figures of Matplotlib as files: formats by name, and letters of all scripts."""
 
 from __future__ import annotations
 
@@ -44,28 +44,28 @@ _SANS = ("sans", "gothic", "hei")
 
 
 def check_picture_name(path: Path, option: str = "") -> None:
-    """See that a picture can be written under a name, before there is one.
+    """Check that a picture can be written under a name, before it is drawn.
 
     Parameters
     ----------
     path
         The file.
     option
-        What asks for it, for the message.
+        Name of the option or argument, for the message.
 
     Raises
     ------
     OutputFileError
-        If its ending is that of no format of pictures that is known here.
+        If the suffix is of no known format of pictures.
     """
     _format_of(path, option)
 
 
 def write_figure(path: str | PathLike[str], figure: Figure, *, dpi: float | None = None) -> None:
-    """Write a figure; the ending of the name tells the format, and without one it is PNG.
+    """Write a figure; the suffix of the name determines the format, PNG without one.
 
-    Letters that the font of a text has not are taken from another font of the computer; a box
-    stands for what none has.
+    Letters that are missing in the font of a text are taken from another font of the computer; a
+    box replaces letters that no font has.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def write_figure(path: str | PathLike[str], figure: Figure, *, dpi: float | None
     Raises
     ------
     OutputFileError
-        If the ending is that of no format of pictures that is known here.
+        If the suffix is of no known format of pictures.
     OSError
         If the file cannot be written.
     """
@@ -107,7 +107,7 @@ def _format_of(path: Path, option: str = "") -> str:
 
 @contextlib.contextmanager
 def _no_word_of_fonts() -> Iterator[None]:
-    """Keep from the terminal that a font has no letters of the usual weight."""
+    """Suppress warnings on the terminal about fonts without letters of the usual weight."""
 
     def is_of_something_else(record: logging.LogRecord) -> bool:
         return not record.getMessage().startswith("findfont:")
@@ -121,7 +121,7 @@ def _no_word_of_fonts() -> Iterator[None]:
 
 
 def _spell(text: Text) -> None:
-    """Give a text the fonts that it needs, and boxes for the letters that none has."""
+    """Give a text the fonts that it needs, and boxes for letters that no font has."""
     from matplotlib import font_manager  # noqa: PLC0415
     from matplotlib.ft2font import FT2Font  # noqa: PLC0415
 
@@ -138,7 +138,7 @@ def _spell(text: Text) -> None:
 
 
 def _visible(letter: str) -> str:
-    """A letter as it can be drawn: nothing of what has no shape of its own, and no tabs."""
+    """Return a letter for drawing: no letters without a shape, and no tabs."""
     if letter == "\n" or letter.isprintable():
         # What only changes the letter before it is left out as well if it is no letter's mark.
         return "" if "\ufe00" <= letter <= "\ufe0f" else letter
@@ -154,9 +154,9 @@ def _has(font: FT2Font, letter: str) -> bool:
 
 @lru_cache(maxsize=64)
 def _fonts_with(letters: frozenset[str]) -> tuple[tuple[str, frozenset[str]], ...]:
-    """Families of fonts, each with those of the letters that none before it has.
+    """Return families of fonts, each with the letters that no earlier one has.
 
-    Letters that no font has are in none.
+    Letters that no font has are left out.
     """
     left = set(letters)
     found: list[tuple[str, frozenset[str]]] = []
@@ -179,7 +179,7 @@ def _families() -> set[str]:
 
 
 def _families_of_new_fonts() -> set[str]:
-    """All, with those of fonts that came after Matplotlib had made its list."""
+    """Return all families, with fonts that are newer than Matplotlib's list."""
     from matplotlib import font_manager  # noqa: PLC0415
 
     manager = font_manager.fontManager
@@ -196,7 +196,7 @@ def _preference(family: str) -> tuple[bool, str]:
 
 
 def _letters_of(family: str, letters: set[str]) -> set[str]:
-    """Those of the letters that a family has, as it is used for text."""
+    """Return which letters a family has in its regular font."""
     from matplotlib import font_manager  # noqa: PLC0415
     from matplotlib.ft2font import FT2Font  # noqa: PLC0415
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing files and folders so that a reader sees the old content or the new, never a part."""
+"""Writing of files and folders so that readers see the old or the new content, never a part."""
 
 from __future__ import annotations
 
@@ -41,24 +41,24 @@ _LETTERS = 24
 
 
 def reason_of(error: OSError) -> str:
-    """Say why something failed, without the file, numbers and names of classes."""
+    """Return why something failed, without file, numbers and class names."""
     return os.strerror(error.errno) if error.errno else str(error)
 
 
 def printable_name(name: str) -> str:
-    """Spell a name of a file or folder for people, also where the locale is not that of its bytes.
+    """Return the name of a file or folder for messages, in any locale.
 
     Parameters
     ----------
     name
-        As Python gives it: bytes that the locale cannot read stand for themselves as surrogates,
-        which no font has and no page may hold.
+        Python replaces bytes that the locale cannot decode by surrogates, which no font has and no
+        page may contain.
     """
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
 def utf8_name(name: str) -> str:
-    """Make a name of a file whose bytes are UTF-8, as Python spells it in this locale."""
+    """Return the name of a file whose bytes are UTF-8, as Python writes it in this locale."""
     return os.fsdecode(printable_name(name).encode())
 
 
@@ -67,17 +67,17 @@ def utf8_path(
     error: type[OrbSlamError],
     remedy: str = "rename the file, or the folder it is in",
 ) -> str:
-    """Spell a path for what takes text in UTF-8, such as the core and OpenCV.
+    """Return a path for libraries that need UTF-8, such as the core and OpenCV.
 
-    The core takes nothing else, and OpenCV ends the whole program over it: over surrogates, which
-    stand for the bytes that are no letters in the locale (they may be UTF-8 all the same).
+    The core accepts only UTF-8. OpenCV ends the whole program at surrogates, which replace bytes
+    that the locale cannot decode, although these may be valid UTF-8.
 
     Parameters
     ----------
     path
         Where the file is.
     error
-        Raised if the path has bytes that are no UTF-8.
+        If the path has bytes that are not UTF-8.
     remedy
         What to do then.
     """
@@ -88,7 +88,7 @@ def utf8_path(
 
 
 def kind_of_special(path: Path) -> str | None:
-    """Name what a path is if it is no file, nor a folder: to open a pipe is to wait for a writer.
+    """Return what a path is if it is no file or folder: a pipe would wait for a writer.
 
     Raises
     ------
@@ -103,10 +103,10 @@ def kind_of_special(path: Path) -> str | None:
 
 
 def temporary_beside(target: Path, ending: str = ".tmp") -> Path:
-    """Choose a hidden name in the folder of a file or folder, in UTF-8 whatever its own is.
+    """Return a hidden name in the folder of a file or folder, in UTF-8.
 
-    It begins like the target's, but is short: one that is as long as the system allows has no
-    room for more.
+    It begins like the target's name, but is short, because a name of the greatest allowed length
+    has no room for additions.
     """
     beginning = printable_name(target.name)[:_LETTERS]
     name = f".{beginning}.{os.getpid()}-{secrets.token_hex(4)}{ending}"
@@ -114,16 +114,16 @@ def temporary_beside(target: Path, ending: str = ".tmp") -> Path:
 
 
 def take_mode(place: Path, target: Path, more: int = 0) -> None:
-    """Give what will replace a file or folder its permissions: what is private stays so.
+    """Give a replacement the permissions of the old file or folder: private ones stay private.
 
     Parameters
     ----------
     place
         What will replace it.
     target
-        If there is none, nothing is done.
+        If there is none, nothing happens.
     more
-        Permissions that it gets as well.
+        Further permissions for it.
     """
     # Some file systems have no permissions, and refuse to change them.
     with contextlib.suppress(OSError):
@@ -132,7 +132,7 @@ def take_mode(place: Path, target: Path, more: int = 0) -> None:
 
 @contextlib.contextmanager
 def failing_as(folder: Path, made: Path) -> Iterator[None]:
-    """Let what cannot be written be the folder that was asked for, not a file in the hidden one."""
+    """Let errors name the requested folder, not a file in the temporary one."""
     try:
         yield
     except OSError as error:
@@ -146,7 +146,7 @@ def failing_as(folder: Path, made: Path) -> Iterator[None]:
 
 
 def describe_error(error: BaseException) -> str:
-    """Say what failed in words for people; of a file which, and why, without numbers."""
+    """Return a readable message: what failed, with which file and why, without numbers."""
     if not isinstance(error, OSError):
         return str(error) or type(error).__name__
     text = error.strerror or str(error)
@@ -157,12 +157,12 @@ def describe_error(error: BaseException) -> str:
 
 @contextlib.contextmanager
 def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Iterator[IO[Any]]:
-    r"""Open a file for writing; it appears under its name only when all was written.
+    r"""Open a file for writing; it gets its name only after everything is written.
 
-    The content goes to a temporary file in the same folder, which replaces `path` at the end of
-    the ``with`` block. If the block raises or the disk is full, the temporary file is removed and
-    an existing file stays as it was; else its permissions stay. Devices and pipes are written
-    directly.
+    The content goes to a temporary file in the same folder, which replaces `path` at the end of the
+    ``with`` block. If the block raises or the disk is full, the temporary file is removed and an
+    existing file is kept. Otherwise the new file gets the permissions of the old one. Devices and
+    pipes are written directly.
 
     Parameters
     ----------
@@ -211,11 +211,11 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
 
 @contextlib.contextmanager
 def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Make a folder that appears under its name only when everything in it was written.
+    """Make a folder that gets its name only after everything in it is written.
 
-    Yields a temporary folder beside it, which takes the place of `path` at the end of the ``with``
-    block. If anything fails, the temporary folder is removed and an existing folder stays as it
-    was; else the existing one is removed with all it holds, but for its permissions.
+    Yields a temporary folder beside it, which replaces `path` at the end of the ``with`` block. If
+    anything fails, the temporary folder is removed and an existing folder is kept. Otherwise the
+    existing one is removed with its contents; only its permissions are kept.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Colours of everything that is drawn, as (red, green, blue).
 
-People with any kind of colour blindness tell them apart (after Okabe and Ito, "Color universal
-design", 2008, made brighter for a dark ground); what matters most differs in shape as well.
+People with any kind of colour blindness can distinguish them (after Okabe and Ito, "Color universal
+design", 2008, brighter for a dark background); the most important ones also differ in shape.
 """
 
 from __future__ import annotations
@@ -94,17 +94,17 @@ PAPER_ERRORS: tuple[Colour, ...] = (
 
 
 def map_colour(number: int) -> Colour:
-    """Colour of a map among several, on a dark ground; they come again after six."""
+    """Return the colour of one of several maps, on a dark background; colours repeat after six."""
     return MAPS[number % len(MAPS)]
 
 
 def paper_map_colour(number: int) -> Colour:
-    """Colour of a map among several, on white."""
+    """Return the colour of one of several maps, on white."""
     return PAPER_MAPS[number % len(PAPER_MAPS)]
 
 
 def lighter(colour: Colour, by: float) -> Colour:
-    """A colour mixed with white: 0 leaves it, 1 is white."""
+    """Return a colour mixed with white: 0 is the colour, 1 is white."""
     red, green, blue = (round(255 * by + value * (1 - by)) for value in colour)
     return red, green, blue
 

@@ -28,12 +28,12 @@ REMEDY = f"scale them to 8 bits with the same low and high for all images: {LINE
 
 @dataclass(frozen=True)
 class GreyRange:
-    """Which grey values of 16 bits become black (0) and white (255).
+    """The grey values of 16 bits that become black (0) and white (255).
 
     Attributes
     ----------
     low, high
-        In grey values; `high` is above `low`.
+        Grey values; `high` is above `low`.
     """
 
     low: float
@@ -68,13 +68,13 @@ def range_of(images: Iterable[NDArray[np.generic]]) -> GreyRange:
 
 
 class FollowingRange:
-    """A range for images that come one after the other: it follows them slowly."""
+    """A range for consecutive images, which it follows slowly."""
 
     def __init__(self) -> None:
         self._range: GreyRange | None = None
 
     def to_8_bits(self, image: NDArray[np.generic]) -> ByteArray:
-        """Scale an image of uint16 to uint8; the first one alone chooses its range."""
+        """Scale an image of uint16 to uint8; the first image determines the range."""
         new = range_of([image])
         if self._range is not None:
             old = self._range

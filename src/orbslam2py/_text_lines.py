@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lines of the text lists that data sets come with."""
+"""Lines of the text lists in data sets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from orbslam2py.errors import DatasetError
 
 @dataclass(frozen=True)
 class TextLine:
-    """A line with content: its number from 1 and its fields without surrounding blanks."""
+    """A line with content: its number from 1 and its fields without surrounding spaces."""
 
     number: int
     fields: list[str]
@@ -27,7 +27,7 @@ def content_lines(path: str | Path, separator: str | None = None) -> list[TextLi
     path
         The file.
     separator
-        Between fields; blanks and tabs if None.
+        Separator of the fields; None: spaces and tabs.
 
     Raises
     ------
@@ -56,12 +56,13 @@ def numbers_of(path: str | Path, line: TextLine, counts: tuple[int, ...]) -> lis
     path, line
         The file, for messages, and a line of it.
     counts
-        How many fields it may have.
+        Allowed numbers of fields.
 
     Raises
     ------
     DatasetError
-        Naming file and line if the number of fields is none of `counts` or one is no number.
+        The message names file and line, if the number of fields is not in `counts` or a field is no
+        number.
     """
     if len(line.fields) not in counts:
         expected = " or ".join(str(count) for count in counts)

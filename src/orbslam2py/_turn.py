@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whose turn it is, among callers that run the steps of workers in their own threads.
+"""Order of callers that run the steps of workers in their own threads.
 
 ``docs/method/threads.md#deterministic-mode``.
 """
@@ -15,9 +15,9 @@ from orbslam2py._waiting import WAIT_SLICE
 
 
 class Turn:
-    """Whose turn it is, among threads whose calls run steps inline; taken again within itself.
+    """Lets threads with inline steps take turns; a thread may take its turn again inside itself.
 
-    Who asks first comes first.
+    Threads are served in the order of their requests.
     """
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class Turn:
 
     @contextlib.contextmanager
     def lent(self) -> Iterator[None]:
-        """Entered by a step around code that is not ours, which may wait for other callers."""
+        """A step enters it around callbacks of users, which may wait for other callers."""
         me = threading.get_ident()
         with self._condition:
             depth = self._depth if self.owner == me else 0

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting without end, in which a Ctrl-C is heard.
+"""Waiting without a limit that Ctrl-C can interrupt.
 
-The interpreter notes a signal and handles it in its main thread, between two steps of the program.
-A signal that comes just before an endless wait begins, or that another thread received, does not
-wake it: the program would stand still until a second one.
+Python handles a signal in its main thread, between two steps of the program. A signal just before
+an unlimited wait, or in another thread, does not end the wait: the program would stay blocked until
+a second signal.
 """
 
 from __future__ import annotations
@@ -15,6 +15,6 @@ WAIT_SLICE = 0.2
 
 
 def wait_for_event(event: threading.Event) -> None:
-    """Wait until it is set, or until a signal's handler raises."""
+    """Wait until it is set, or until the handler of a signal raises."""
     while not event.wait(WAIT_SLICE):
         pass

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Workers: one thread around one step.
 
-With counted pauses, a reset that is served in every state, bounded waits, and errors that reach
-the caller.
+With counted pauses, a reset in every state, waits with a limit, and errors that reach the caller.
 
-Nobody waits for somebody who waits for him, because pauses are counted tickets, a reset is
-acknowledged while paused as well, and no lock of the map is held while waiting. A worker can also
-run inline (``threaded=False``): the same steps in the caller's thread, which makes two runs equal.
-Callers in several threads then take turns.
-The whole protocol: ``docs/method/threads.md#workers``.
+There are no deadlocks: pauses are counted tickets, a reset is also acknowledged during a pause, and
+no lock of the map is held while waiting. A worker can also run inline (``threaded=False``): the
+same steps in the caller's thread, so that two runs are equal. Then callers in several threads take
+turns. The whole protocol: ``docs/method/threads.md#workers``.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ Job = TypeVar("Job")
 
 
 class WorkerState(enum.Enum):
-    """What a worker is doing."""
+    """The state of a worker."""
 
     IDLE = "idle"
     BUSY = "busy"
@@ -45,7 +43,7 @@ class WorkerState(enum.Enum):
 class PauseTicket:
     """One holder of a worker's pause; the worker resumes when all tickets are released.
 
-    Releasing is idempotent, and the ticket is a context manager.
+    A ticket may be released several times; it is a context manager.
     """
 
     def __init__(self, release: Callable[[], None], wait: Callable[[float | None], bool]) -> None:
@@ -54,7 +52,7 @@ class PauseTicket:
         self._released = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the worker stands still; False when `timeout` seconds passed first."""
+        """Wait until the worker is paused; False if `timeout` seconds are over first."""
         return self._wait(timeout)
 
     def release(self) -> None:
@@ -71,7 +69,7 @@ class PauseTicket:
 
 
 class Worker(Generic[Job]):
-    """A queue and a step that takes one job at a time from it.
+    """A queue and a step that processes one job at a time from it.
 
     Parameters
     ----------
@@ -119,9 +117,9 @@ class Worker(Generic[Job]):
         Parameters
         ----------
         drain : bool
-            Process the waiting jobs first; otherwise they are dropped and the running step is
-            asked to end early. A worker whose pause may last does not wait for its end: it drops
-            them.
+            Process the waiting jobs first; otherwise they are dropped and the running step is asked
+            to end early. If its pause may be long, it does not wait for the end of the pause, but
+            drops them.
         timeout : float, optional
             Seconds to wait for the jobs, and again for the thread.
 
@@ -158,7 +156,7 @@ class Worker(Generic[Job]):
     def reset(self, timeout: float | None = None) -> None:
         """Drop all waiting jobs and wait until the running step has ended, paused or not.
 
-        A step that is off duty will end without touching the map; nobody waits for it.
+        The map is safe from a step that is off duty; nobody waits for it.
         """
         with self._condition:
             self._queue.clear()
@@ -174,7 +172,7 @@ class Worker(Generic[Job]):
     def submit(self, *jobs: Job) -> None:
         """Append jobs, and ask a running step to end early; none begins before all are queued.
 
-        Inline, all of them are done on return.
+        Inline, all jobs are done at the return.
 
         Raises
         ------
@@ -187,7 +185,7 @@ class Worker(Generic[Job]):
             raise StateError(f"{self.name} has been shut down")
 
     def offer(self, *jobs: Job) -> bool:
-        """As `submit`, for work that nobody misses after the end: False, and nothing is queued."""
+        """Like `submit`, for work that may be dropped at the end: then it returns False."""
         self.raise_if_failed()
         with self._condition:
             if self._finish_requested:
@@ -246,8 +244,8 @@ class Worker(Generic[Job]):
         Returns
         -------
         bool
-            False if the step should skip that part, because a job waits, a pause is asked for or
-            the worker is to finish; otherwise the interrupt is lowered.
+            False if the step should skip that part, because a job waits, a pause is requested or
+            the worker should finish; otherwise the interrupt flag is cleared.
         """
         with self._condition:
             unwanted = self._finish_requested or self.cancel_flag.is_set()
@@ -258,11 +256,11 @@ class Worker(Generic[Job]):
 
     @contextlib.contextmanager
     def off_duty(self) -> Iterator[None]:
-        """Entered by a step for a long part that leaves the map alone.
+        """Used by a step around a long part that does not change the map.
 
-        A pause or a reset does not wait for that part; its end waits for the end of the pause, or
-        raises `cancel_flag` if the worker runs inline. Afterwards the step must look at that flag,
-        and end if it is raised.
+        A pause or a reset does not wait for that part. At its end, the part waits for the end of
+        the pause, or sets `cancel_flag` if the worker runs inline. Then the step must check that
+        flag, and end if it is set.
         """
         with self._condition:
             self._off_duty = True
@@ -279,19 +277,19 @@ class Worker(Generic[Job]):
                 self._off_duty = False
 
     def lend_turn(self) -> contextlib.AbstractContextManager[None]:
-        """Let other threads' inline steps run meanwhile: entered around code that is not ours."""
+        """Let inline steps of other threads run meanwhile: used around callbacks of users."""
         return self._turn.lent()
 
     # ---- pauses ----------------------------------------------------------------------------------
     def pause(self, *, brief: bool = False) -> PauseTicket:
-        """Ask the worker to stand still after the running step; see `PauseTicket`.
+        """Ask the worker to pause after the running step; see `PauseTicket`.
 
-        An inline worker stands still whenever other code of its caller runs.
+        An inline worker is paused whenever other code of its caller runs.
 
         Parameters
         ----------
         brief : bool
-            The ticket will be released soon whatever happens, so that others may wait for it.
+            Whether the ticket will certainly be released soon, so that others may wait for it.
         """
         lasting = 0 if brief else 1
         with self._condition:
@@ -310,18 +308,18 @@ class Worker(Generic[Job]):
 
     @property
     def pausing(self) -> bool:
-        """Whether a pause is in force or asked for."""
+        """Whether a pause is active or requested."""
         return self._pauses > 0
 
     @property
     def held(self) -> bool:
-        """Whether a pause that may last is in force or asked for."""
+        """Whether a pause that may be long is active or requested."""
         return self._holds > 0
 
     # ---- state -----------------------------------------------------------------------------------
     @property
     def state(self) -> WorkerState:
-        """What the worker is doing now."""
+        """The present state of the worker."""
         with self._condition:
             if self._error is not None:
                 return WorkerState.FAILED
@@ -333,23 +331,23 @@ class Worker(Generic[Job]):
 
     @property
     def threaded(self) -> bool:
-        """Whether it has a thread of its own."""
+        """Whether it has a separate thread."""
         return self._threaded
 
     @property
     def ended(self) -> bool:
-        """`finish` was called and no thread is left."""
+        """Whether `finish` was called and no thread remains."""
         no_thread = self._thread is None and (self._threaded or self._is_idle_elsewhere())
         return self._finish_requested and no_thread
 
     @property
     def n_waiting(self) -> int:
-        """Number of jobs not yet begun."""
+        """Number of jobs that have not begun."""
         return len(self._queue)
 
     @property
     def idle(self) -> bool:
-        """No job waits and none is in work."""
+        """Whether no job waits and none is running."""
         with self._condition:
             return self._is_idle()
 
@@ -367,9 +365,9 @@ class Worker(Generic[Job]):
         self.raise_if_failed()
 
     def wait_until_idle(self, timeout: float | None = None, *, unless_held: bool = False) -> bool:
-        """Wait until every job is done; False when `timeout` seconds passed first.
+        """Wait until every job is done; False if `timeout` seconds are over first.
 
-        With `unless_held` also False as soon as a pause is in force that may last.
+        With `unless_held` also False as soon as there is a pause that may be long.
         """
         self.wait_until(
             lambda: self._is_idle() or self._error is not None or (unless_held and self.held),
@@ -379,7 +377,7 @@ class Worker(Generic[Job]):
         return self.idle
 
     def raise_if_failed(self) -> None:
-        """Raise `WorkerError`, with the original as its cause, if a step has failed."""
+        """Raise `WorkerError`, with its cause, if a step has failed."""
         error = self._error
         if isinstance(error, WorkerError):
             # A later worker has failed, and this one when it handed a job on.
@@ -395,7 +393,7 @@ class Worker(Generic[Job]):
         Raises
         ------
         StateError
-            If a step that runs in this very thread would have to end first, and no time is given.
+            If a step in this thread would have to end first, and no time is given.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         with self._condition:
@@ -421,7 +419,7 @@ class Worker(Generic[Job]):
         return self._off_duty or self._is_idle_elsewhere()
 
     def _is_idle_elsewhere(self) -> bool:
-        """No step runs, but for one that this call is part of, or that has lent its turn."""
+        """Return whether no step runs, except the caller's, or one that has yielded its turn."""
         mine = self._inline_in == threading.get_ident()
         return not self._busy or mine or not (self._threaded or self._turn.owner == self._inline_in)
 
@@ -451,7 +449,7 @@ class Worker(Generic[Job]):
 
 
 def take_turns(workers: Iterable[Worker[Any]]) -> None:
-    """Let no two of these workers run inline at once, for callers in different threads."""
+    """Prevents inline steps of these workers from running at once in different threads."""
     turn = Turn()
     for worker in workers:
         worker._turn = turn

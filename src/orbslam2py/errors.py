@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the package raises on purpose.
+"""Exceptions of the package.
 
-Every message names the thing that is wrong and what to do about it.
+Every message names the fault and the remedy.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class MapFileError(OrbSlamError):
 
 
 class OutputFileError(OrbSlamError):
-    """A file that was asked for cannot be written there: a video, a page, settings."""
+    """An output file cannot be written: a video, a page, settings."""
 
 
 class ImageError(OrbSlamError):

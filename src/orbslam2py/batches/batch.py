@@ -31,16 +31,16 @@ PICTURE = "sweep.png"
 
 @dataclass(frozen=True)
 class BatchResult:
-    """A batch that has ended.
+    """The result of a batch.
 
     Attributes
     ----------
     folder
-        Where the table is, and a folder with the runs; its address if it is elsewhere.
+        The folder of the table and the runs; its address if it is remote.
     rows
-        What is in the table, a dictionary a run.
+        The rows of the table, one dictionary for each run.
     n_left
-        Runs that were not made because the batch was stopped.
+        Number of runs that were not made because the batch was stopped.
     files
         The files of the table, and the picture of a sweep.
     """
@@ -52,7 +52,7 @@ class BatchResult:
 
     @property
     def groups(self) -> list[Group]:
-        """Runs that differ in their seeds alone, with median and range."""
+        """Runs that differ only in their seeds, with median and range."""
         return summarise(self.rows)
 
     @property
@@ -84,43 +84,43 @@ def batch(
         A job file (YAML), or a dictionary with the same keys.
     output
         Folder for the results, or an address for fsspec such as ``s3://bucket/night``; by default
-        the ``output`` that the jobs name.
+        the ``output`` in the job file.
     resume
-        Go on in a folder that has results: what was finished is not run again.
+        Continue in a folder with results: finished runs are not repeated.
     scheduler
         Address of a running Dask scheduler (``tcp://HOST:PORT``); by default workers are started on
         this computer.
     workers
-        How many to start; by default one a core. 0: run in this process, one after the other.
+        Number of workers to start; by default one per core. 0: run in this process, one after the
+        other.
     memory_limit
-        Of each worker that is started, such as ``4GB``, at least 500 MB; by default an equal part
-        of the computer's. It has no meaning with a `scheduler`, nor without workers.
+        Limit for each started worker, such as ``4GB``, at least 500 MB; by default an equal share
+        of the computer's memory. Not used with a `scheduler`, nor without workers.
     report_pages
         Write ``report.html`` for every run.
     cache
-        Folder for sequences from elsewhere (``s3://``, ``https://``, zip and tar files), on each
-        worker's computer; by default one among the user's caches.
+        Folder for remote sequences (``s3://``, ``https://``, zip and tar files), on each worker's
+        computer; by default in the user's cache.
     cache_size
-        Most that it takes, such as ``20GB``, which it is by default.
+        Largest size of this folder; the default is ``20GB``.
     progress
-        Called after each run with its row, and how many of how many have ended.
+        Called after each run with its row, the number of ended runs, and the number of all runs.
     watch
-        Called now and then with a dictionary: the run that each worker makes.
+        Called regularly with a dictionary: the present run of each worker.
     stop
-        When it is set no more runs begin, and those that run are waited for.
+        An event; when it is set, no more runs begin, and the batch waits for the running ones.
 
     Returns
     -------
     BatchResult
-        Also if runs failed: their rows say why.
+        Also if runs failed: their rows contain the reason.
 
     Raises
     ------
     SettingsError
         If the jobs or options are wrong, or Dask is not installed. Nothing is written then.
     DatasetError
-        If a sequence is not there, the folder cannot take results, or the scheduler cannot be
-        reached.
+        If a sequence is missing, the folder cannot be used, or the scheduler cannot be reached.
     OSError
         If the table cannot be written.
 
@@ -169,7 +169,7 @@ def run_jobs(
     watch: Watch | None = None,
     stop: threading.Event | None = None,
 ) -> BatchResult:
-    """Run jobs that are made already; see `batch`."""
+    """Run prepared jobs; see `batch`."""
     results = Results.at(place)
     results.require_free(resume=resume)
     rows = results.rows_of(wanted) if resume else {}
@@ -199,7 +199,7 @@ def run_jobs(
 
 @contextlib.contextmanager
 def _begun(results: Results, workers: Workers, n_jobs: int) -> Iterator[Any]:
-    """Make the place of the batch, and have the workers that it needs; None if it needs none."""
+    """Make the folder of the batch, and start the workers that it needs; None if it needs none."""
     if workers.is_this_process or not n_jobs:
         results.begin()
         yield None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A folder of bounded size for sequences from elsewhere, shared by all workers of a computer."""
+"""A folder of limited size for remote sequences, shared by all workers of a computer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Fetch = Callable[[Path, Callable[[int], None]], None]
 
 
 def cache_size_of(size: str | int) -> int:
-    """Read the most that a cache may take, such as ``20GB``.
+    """Read the size limit of a cache, such as ``20GB``.
 
     Raises
     ------
@@ -43,14 +43,14 @@ def default_folder() -> Path:
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder of bounded size; what was not used for longest makes room.
+    """A folder of limited size; the content with the oldest use is removed first.
 
     Attributes
     ----------
     folder
-        Where it is; made when it is used.
+        The folder; it is created at its first use.
     limit
-        Most bytes of what is in it.
+        Size limit in bytes.
     """
 
     folder: Path
@@ -58,14 +58,15 @@ class Cache:
 
     @contextlib.contextmanager
     def holding(self, address: str, fetch: Fetch) -> Iterator[Path]:
-        """Have content in the cache; it is not removed before the end of the ``with``.
+        """Make content available in the cache; it is not removed before the end of the ``with``.
 
         Parameters
         ----------
         address
-            What tells it from other content.
+            Identification of the content.
         fetch
-            Gets it, if it is not there yet. Other workers that want the same wait for it.
+            Gets the content, if it is not in the cache yet. Other workers that need the same
+            content wait for it.
 
         Yields
         ------
@@ -94,7 +95,7 @@ class Cache:
             yield self.folder / key
 
     def _is_held(self, key: str, stack: contextlib.ExitStack) -> bool:
-        """Keep content from being removed until the end of `stack`; False if it is not there."""
+        """Protect content until the end of `stack`; False if it is not in the cache."""
         with contextlib.ExitStack() as held:
             held.enter_context(self._locked(key, fcntl.LOCK_SH))
             if not (self.folder / key).is_dir():
@@ -117,7 +118,7 @@ class Cache:
             raise
 
     def _reserve(self, key: str, address: str, size: int) -> None:
-        """Make room for content, and note that it is taken."""
+        """Make room for content, and count it."""
         if size > self.limit:
             raise DatasetError(
                 f"{address} takes {text_of(size)}, more than the cache of {text_of(self.limit)}; "

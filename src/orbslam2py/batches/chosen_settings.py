@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings that the runs of a batch are to have: looked at before the first run."""
+"""Settings of the runs of a batch, checked before the first run."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from orbslam2py.settings.settings import looks_like_path
 
 
 def settings_name(choice: Any, folder: Path, *, elsewhere: bool) -> str:
-    """Return what a choice of settings names: a file beside the job file, or built-in settings.
+    """Return the settings of a choice: a file beside the job file, or built-in settings.
 
     Parameters
     ----------
     choice
         A path or a name.
     folder
-        What paths are relative to.
+        The folder of relative paths.
     elsewhere
-        Let paths through that are not there: workers on other computers may see them.
+        Accept missing paths: workers on other computers may see them.
 
     Raises
     ------
@@ -58,15 +58,15 @@ def settings_name(choice: Any, folder: Path, *, elsewhere: bool) -> str:
 
 
 def require_usable(jobs: Iterable[Job]) -> None:
-    """See that all settings serve at least one of the sensors that they are to be used with.
+    """Check that all settings fit at least one of their sensors.
 
-    Everything is combined with everything in a job file, so that settings that serve another
-    sensor are no mistake: those runs fail, and the table says why.
+    A job file combines everything with everything, so settings for another sensor are no mistake:
+    these runs fail, and the table says why.
 
     Raises
     ------
     SettingsError
-        If no run with some settings could begin: what is wrong with them.
+        If no run with some settings could begin; the message says what is wrong with them.
     """
     sensors: dict[str, dict[Sensor, None]] = {}
     for job in jobs:
@@ -84,7 +84,7 @@ def require_usable(jobs: Iterable[Job]) -> None:
 
 
 def _problem_of(name: str, sensor: Sensor) -> SettingsError | None:
-    """Return why settings do not serve a sensor; what is only doubtful, the runs say."""
+    """Return why settings do not fit a sensor; the runs report mere doubts."""
     try:
         if is_builtin_name(name):
             builtin_settings(name, sensor)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the runs of a batch are made: in workers of Dask, on this computer or a cluster."""
+"""Execution of the runs of a batch: by workers of Dask, on this computer or a cluster."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 Watch = Callable[[dict[str, str]], None]
-"""Hears which run each worker makes."""
+"""Gets the present run of each worker."""
 
 
 def require_dask() -> Any:
@@ -51,7 +51,7 @@ def require_dask() -> Any:
     Raises
     ------
     SettingsError
-        If it is not installed, with the line that installs it.
+        If it is not installed, with the command that installs it.
     """
     try:
         return importlib.import_module("distributed")
@@ -64,7 +64,7 @@ def require_dask() -> Any:
 
 @contextlib.contextmanager
 def open_workers(workers: Workers, most: int | None = None) -> Iterator[Any]:
-    """Connect to a scheduler, or start one with workers on this computer alone.
+    """Connect to a scheduler, or start one with workers only on this computer.
 
     Parameters
     ----------
@@ -139,20 +139,20 @@ def run_on(
     jobs
         What to run.
     results
-        The place of the batch, which all workers see.
+        The folder of the batch, which all workers see.
     stop
-        When it is set no more runs begin; those that run are waited for.
+        An event; when it is set, no more runs begin, and the running ones are waited for.
     page
         Write ``report.html`` for every run.
     cache
-        Where sequences from elsewhere go, on each worker's computer.
+        Folder for remote sequences, on each worker's computer.
     watch
-        Called now and then with the run that each worker makes.
+        Called regularly with the present run of each worker.
 
     Raises
     ------
     DatasetError
-        If the scheduler is lost on the way.
+        If the connection to the scheduler is lost.
     """
     waiting = iter(jobs)
     runs = _Handed(client, results, page=page, cache=cache)
@@ -195,7 +195,7 @@ class _Handed:
         return len(self._running)
 
     def n_at_once(self) -> int:
-        """How many runs the workers make at once, as they come and go."""
+        """Return how many runs the workers make at once; workers may come and go."""
         if time.monotonic() >= self._counted + _LOOK_AROUND:
             with contextlib.suppress(OSError):  # the scheduler may come back
                 self._n_at_once = max(1, sum(self._client.nthreads().values()))
@@ -203,14 +203,14 @@ class _Handed:
         return self._n_at_once
 
     def is_time_to_look(self) -> bool:
-        """True once in a while."""
+        """Yield True at intervals."""
         if time.monotonic() < self._looked + _LOOK_AROUND:
             return False
         self._looked = time.monotonic()
         return True
 
     def at_workers(self) -> dict[str, str]:
-        """Return the run that each worker makes; those that wait there come behind it."""
+        """Return the present run of each worker, followed by its waiting runs."""
         jobs = {future.key: job.key for future, (job, _) in self._running.items()}
         with contextlib.suppress(OSError):  # the scheduler may come back
             at = self._client.processing().items()
@@ -235,7 +235,7 @@ class _Handed:
             future.cancel()
 
     def next_ended(self) -> tuple[Job, dict[str, Any]] | None:
-        """Wait for a run that has ended; None now and then, and for one that is to be run again."""
+        """Wait for a run that has ended; None at intervals, and for one that will be repeated."""
         try:
             future = self._ended.get(timeout=_LOOK_AROUND)
         except queue.Empty:
@@ -265,7 +265,7 @@ class _Handed:
 
 
 def _is_an_error_of_the_run(error: Exception) -> bool:
-    """Whether the run itself failed, rather than its worker or the way to it."""
+    """Return whether the run itself failed, not its worker or the connection."""
     return type(error).__module__.partition(".")[0] not in ("distributed", "concurrent", "asyncio")
 
 
@@ -284,10 +284,10 @@ def _words_of(error: Exception) -> str:
 
 
 def _greets(scheduler: str) -> bool:
-    """Whether what answers at an address begins as a scheduler does.
+    """Return whether the server at an address answers like a scheduler.
 
-    It speaks first, with the length of its message in eight bytes. Dask would take the text of
-    another program for such a length, and wait for that much without end.
+    A scheduler sends first: the length of its message in eight bytes. Dask would interpret the text
+    of another program as such a length, and wait for that much data without a limit.
     """
     protocol, _, place = scheduler.rpartition("://")
     host, _, port = place.rstrip("/").rpartition(":")
@@ -357,5 +357,5 @@ def _version_here() -> str:
 
 
 def _leave_interrupts_to_the_batch() -> None:
-    """Ctrl-C goes to all processes of a terminal; what it means is for the batch to say."""
+    """Ignore Ctrl-C, which a terminal sends to all processes; the batch handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

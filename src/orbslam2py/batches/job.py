@@ -38,18 +38,18 @@ class Job:
     sensor
         ``mono``, ``stereo`` or ``rgbd``; None for the richest there are images for.
     settings
-        A file or a built-in name; None for what the sequence tells.
+        A file or a built-in name; None: the settings of the sequence.
     topics
         Of a bag.
     options
-        Options of the run that are not the usual ones.
+        Options of the run that are not default.
     parameters
         Keys of the settings that are swept, and their values in this run.
     seed
         Seed of the run.
     label
-        What its folder is called, but for the seed, where the plain name is that of other runs of
-        the batch as well; else empty.
+        Name of its folder without the seed, if the usual name is also that of other runs; otherwise
+        empty.
     """
 
     path: str
@@ -69,12 +69,12 @@ class Job:
 
     @property
     def setting(self) -> str:
-        """What the runs with other seeds have in common."""
+        """What it has in common with the runs of other seeds."""
         return self.label or label_of(self)
 
     @property
     def fingerprint(self) -> str:
-        """Tells this job from another one in the same folder."""
+        """Identification of this job among others in the same folder."""
         told = dataclasses.asdict(self)
         del told["label"]  # it says nothing new, and earlier versions had none
         text = json.dumps(told, sort_keys=True, default=str)
@@ -86,7 +86,7 @@ class Job:
         Raises
         ------
         SettingsError, DatasetError
-            If they make no sense.
+            If they are invalid.
         """
         given = dict(self.options)
         system = SystemOptions(
@@ -106,14 +106,14 @@ class Job:
 
 
 def label_of(job: Job, settings: str | None = None, *, exact: bool = False) -> str:
-    """Say what a run is of, but for its seed.
+    """Describe a run without its seed.
 
     Parameters
     ----------
     job
         The run.
     settings
-        What its settings are called; as their file without its ending if None.
+        Name of its settings; None: the name of their file without its suffix.
     exact
         Write all digits of numbers, not only six.
     """

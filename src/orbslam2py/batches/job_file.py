@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The text of a job file as named values, none of them given twice."""
+"""The text of a job file as named values, none of them repeated."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _MERGE = "tag:yaml.org,2002:merge"
 
 
 class _KeyTwiceError(yaml.MarkedYAMLError):  # type: ignore[misc]
-    """A mapping has a key twice."""
+    """A mapping has a repeated key."""
 
 
 class _Loader(yaml.SafeLoader):  # type: ignore[misc]
-    """Refuses keys that are given twice, of which PyYAML takes the last without a word."""
+    """Refuses repeated keys, of which PyYAML uses the last without a message."""
 
     def compose_mapping_node(self, anchor: Any) -> Any:
-        """Look at the keys as they are written: later those of merged mappings (``<<``) join."""
+        """Check the written keys, before those of merged mappings (``<<``) are added."""
         node = super().compose_mapping_node(anchor)
         places: dict[tuple[str, str], Any] = {}
         for key, _ in node.value:
@@ -40,12 +40,12 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc]
 
 
 def read_document(path: Path) -> Mapping[str, Any]:
-    """Read what a job file says.
+    """Read the contents of a job file.
 
     Raises
     ------
     SettingsError
-        If it cannot be read, is no YAML, gives a key twice, or holds no named values.
+        If it cannot be read, is no YAML, repeats a key, or has no named values.
     """
     try:
         document = yaml.load(path.read_text(encoding="utf-8"), _Loader)

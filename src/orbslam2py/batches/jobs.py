@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a batch is to run: sequences, sensors, settings, options, sweeps and seeds, as a product."""
+"""The runs of a batch: sequences, sensors, settings, options, sweeps and seeds, as a product."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def read_jobs(path: Path, *, elsewhere: bool = False) -> tuple[list[Job], Path |
     path
         A YAML file; paths in it are relative to its folder.
     elsewhere
-        Whether workers may see settings files that this computer does not.
+        Whether workers may see settings files that this computer does not see.
 
     Returns
     -------
@@ -53,9 +53,9 @@ def read_jobs(path: Path, *, elsewhere: bool = False) -> tuple[list[Job], Path |
     Raises
     ------
     SettingsError
-        If the file cannot be read or is wrong.
+        If the file cannot be read or is invalid.
     DatasetError
-        If a sequence is not there.
+        If a sequence is missing.
     """
     document = read_document(path)
     try:
@@ -71,24 +71,24 @@ def read_jobs(path: Path, *, elsewhere: bool = False) -> tuple[list[Job], Path |
 def make_jobs(
     document: Mapping[str, Any], folder: Path | None = None, *, elsewhere: bool = False
 ) -> list[Job]:
-    """Make the runs that a job file, or a dictionary like one, asks for.
+    """Make the runs of a job file, or of a dictionary with the same keys.
 
     Parameters
     ----------
     document
-        ``sequences`` and, if wanted, ``sensors``, ``settings``, ``options``, ``seeds``, ``sweep``.
+        ``sequences`` and optionally ``sensors``, ``settings``, ``options``, ``seeds``, ``sweep``.
     folder
-        What paths are relative to; the present one if None.
+        The folder of relative paths; None: the present one.
     elsewhere
-        Whether workers may see settings files that this computer does not.
+        Whether workers may see settings files that this computer does not see.
 
     Raises
     ------
     SettingsError
-        For unknown keys and values that make no sense, for settings that are missing or wrong, or
-        if two runs would have one folder and it is for the caller to say what tells them apart.
+        For unknown keys and invalid values, for settings that are missing or wrong, or if two runs
+        would have the same folder and only the caller can give them different names.
     DatasetError
-        If a sequence is not there.
+        If a sequence is missing.
     """
     folder = folder or Path()
     _refuse_unknown(document, _KEYS, "key")
@@ -177,7 +177,7 @@ def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
     Raises
     ------
     SettingsError, DatasetError
-        For an unknown one, and for values that would fail in every run.
+        For an unknown option, and for values that would fail in every run.
     """
     _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS, *CONFIG_NAMES), "option")
     given = tuple((name, _plain_value(values[name])) for name in sorted(values))
@@ -186,7 +186,7 @@ def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
 
 
 def _plain_value(value: Any) -> Any:
-    """Take numbers of NumPy and others as Python's own, which files can hold."""
+    """Convert numbers of NumPy and others to Python's, which files can contain."""
     if isinstance(value, bool | np.bool_):
         return bool(value)
     if is_whole(value):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the folders of runs are called: by what they are of, no two alike, and none too long.
+"""Names of the folders of runs: descriptive, all different, and not too long.
 
-A batch is gone on with by these names, so whatever could be called in the plain way still is.
+A batch is continued by these names, so the plain name is kept where it is possible.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ _OWN_NAMES = "give the sequences names of their own ('path: ..., name: ...')"
 
 
 def with_labels_of_their_own(jobs: Sequence[Job]) -> list[Job]:
-    """Give jobs that would be called alike labels that say more.
+    """Give jobs with equal names labels that distinguish them.
 
     Parameters
     ----------
     jobs
-        All of a batch, each once whatever its seeds, without labels.
+        All jobs of a batch without seeds and labels.
 
     Raises
     ------
     SettingsError
-        If it is for the user to tell them apart: two sequences of one name, or one run twice; or
-        if the file system cannot spell a name.
+        If only the user can distinguish them: two sequences of one name, or one run twice; or if
+        the file system cannot write a name.
     """
     places: dict[str, list[int]] = {}
     for place, job in enumerate(jobs):
@@ -60,7 +60,7 @@ def with_labels_of_their_own(jobs: Sequence[Job]) -> list[Job]:
 
 
 def _require_spelling(key: str) -> None:
-    """See that this system can write a name, as in an ASCII locale it could not all letters."""
+    """Check that this system can write a name; in an ASCII locale, some letters are impossible."""
     try:
         os.fsencode(key)
     except UnicodeEncodeError as error:
@@ -72,7 +72,7 @@ def _require_spelling(key: str) -> None:
 
 
 def _require_differences(label: str, group: list[Job]) -> None:
-    """See that runs of one label are of one sequence, and that none is there twice."""
+    """Check that runs of one label are of one sequence, and that none is repeated."""
     first = group[0]
     clash = f"two runs would have the folder {key_of(label, first.seed)}: "
     for job in group[1:]:
@@ -95,7 +95,7 @@ def _require_differences(label: str, group: list[Job]) -> None:
 
 
 def _names_of(settings: set[str]) -> dict[str, str]:
-    """Name files by as much of their paths as tells them apart; nothing if their paths do not."""
+    """Name files by as much of their paths as distinguishes them; empty if the paths do not."""
     deepest = max((len(Path(one).parts) for one in settings), default=0)
     for depth in range(1, deepest + 1):
         for with_ending in (False, True):
@@ -106,7 +106,7 @@ def _names_of(settings: set[str]) -> dict[str, str]:
 
 
 def _end_of(path: Path, depth: int, *, with_ending: bool) -> str:
-    """Join the last parts of a path, as far as names of folders can hold them."""
+    """Join the last parts of a path, within the length of a folder's name."""
     *folders, _ = path.parts[-depth:]
     return plain_name("_".join([*folders, path.name if with_ending else path.stem]))
 

@@ -23,7 +23,7 @@ SIGNS = "_.=+"
 
 
 def label_of_parts(parts: Iterable[str], values: Iterable[tuple[str, Any]], *, exact: bool) -> str:
-    """Join what a run is of: names and values, without those that are empty.
+    """Join names and values of a run, without empty ones.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def label_of_parts(parts: Iterable[str], values: Iterable[tuple[str, Any]], *, e
 
 
 def key_of(label: str, seed: int) -> str:
-    """Name the folder of a run; of a name that no disk takes the end is a fingerprint of it."""
+    """Name the folder of a run; a name that is too long ends with a fingerprint."""
     key = f"{label}-seed{seed}"
     if len(key.encode()) <= _LONGEST:
         return key
@@ -55,10 +55,10 @@ def _short(value: Any, *, exact: bool) -> str:
 
 
 def plain_name(text: str) -> str:
-    """Leave only what is harmless in names of files: letters and digits of any script, few signs.
+    """Keep only harmless characters of file names: letters and digits of any script, few signs.
 
-    Letters with accents are one character each, whichever way they were typed: some file systems
-    take both ways for one name.
+    Letters with accents become one character each, because some file systems do not distinguish
+    both forms.
     """
     if not text.isascii():
         text = unicodedata.normalize("NFC", text)
@@ -69,7 +69,7 @@ def plain_name(text: str) -> str:
 
 
 def _is_harmless(letter: str, before: str) -> bool:
-    """Whether a character may stay, behind another one: marks belong to letters in many scripts."""
+    """Return whether a character may follow another one, such as a mark of a letter."""
     if _is_mark(letter):
         return before.isalnum() or _is_mark(before)
     return letter.isalnum() or letter in SIGNS

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sequences that are not folders of this computer: archives, and whatever fsspec opens."""
+"""Sequences that are not folders of this computer: archives, and all that fsspec opens."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ _ERRORS_OF_NAMES = (errno.ENAMETOOLONG, errno.EEXIST, errno.ENOTDIR, errno.EISDI
 
 
 def is_remote(path: str) -> bool:
-    """Tell whether a path is an address such as ``s3://bucket/desk``."""
+    """Return whether a path is an address such as ``s3://bucket/desk``."""
     return _ADDRESS.match(path) is not None
 
 
 def is_archive(path: str) -> bool:
-    """Tell whether a path is that of a zip or tar file, by its name."""
+    """Return whether a path is that of a zip or tar file, by its name."""
     return path.lower().endswith(_ARCHIVES)
 
 
@@ -48,12 +48,12 @@ def name_of(path: str) -> str:
 
 
 def require_protocols(address: str) -> None:
-    """See that fsspec is there and knows the protocols of an address.
+    """Check that fsspec is installed and knows the protocols of an address.
 
     Raises
     ------
     SettingsError
-        If it, or what it needs for the protocol, is not installed.
+        If fsspec, or a package that it needs for the protocol, is not installed.
     DatasetError
         If there is no such protocol.
     """
@@ -75,7 +75,7 @@ def require_protocols(address: str) -> None:
 
 @contextlib.contextmanager
 def here(path: str, cache: Cache) -> Iterator[Path]:
-    """Have a sequence on this computer: in the cache, if it is elsewhere or in an archive.
+    """Make a sequence available on this computer: in the cache, if it is remote or in an archive.
 
     Parameters
     ----------
@@ -88,14 +88,14 @@ def here(path: str, cache: Cache) -> Iterator[Path]:
     Yields
     ------
     Path
-        Where it is; it stays there until the end of the ``with``.
+        Its path, which is valid until the end of the ``with``.
 
     Raises
     ------
     DatasetError
-        If there is nothing at the address, it cannot be read, or it does not fit.
+        If there is nothing at the address, if it cannot be read, or if it is too large.
     SettingsError
-        If fsspec is needed and not installed.
+        If fsspec is needed but not installed.
     """
     if is_remote(path):
         require_protocols(path)
@@ -179,7 +179,7 @@ def _extract(
     taken: int = 0,
     name: str | None = None,
 ) -> None:
-    """Unpack an archive; nothing in it is written elsewhere than in the folder."""
+    """Unpack an archive; nothing is written outside the folder."""
     named = name or str(archive)
     try:
         if zipfile.is_zipfile(archive):
@@ -233,7 +233,7 @@ def _extract_tar(
 
 
 def _check_end(tar: tarfile.TarFile) -> None:
-    """Refuse a spoilt header, at which the list of members ends as if nothing came after it."""
+    """Refuse a damaged header, at which the list of members would end without an error."""
     if isinstance(tar.fileobj, io.BufferedReader):  # what is packed more tightly has a sum of all
         tar.fileobj.seek(tar.offset)
         if any(tar.fileobj.read(tarfile.BLOCKSIZE)):
@@ -241,7 +241,7 @@ def _check_end(tar: tarfile.TarFile) -> None:
 
 
 def _read_to_the_end(stream: Any) -> None:
-    """Let what was unpacked be checked: the sum of all bytes stands at the end."""
+    """Check the unpacked archive: the checksum of all bytes is at its end."""
     try:
         while stream.read(1 << 20):
             pass
@@ -261,7 +261,7 @@ def _write(stream: IO[bytes], folder: Path, name: str, archive: str) -> None:
 
 
 def _inside(folder: Path) -> Path:
-    """Go down as long as there is one folder and nothing beside it."""
+    """Go down while a folder contains only one folder."""
     while True:
         inner = [path for path in folder.iterdir() if path.name not in _NOT_MEANT]
         if len(inner) != 1 or inner[0].name == "mav0":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the runs of a batch and its table go: a folder that all workers see, or a bucket."""
+"""Location of the runs of a batch and its table: a folder that all workers see, or a bucket."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _STOP_FILE = "stop"
 
 @dataclass(frozen=True)
 class Results:
-    """The place of a batch.
+    """The location of a batch.
 
     Attributes
     ----------
@@ -56,17 +56,17 @@ class Results:
 
     @property
     def folder(self) -> Path | None:
-        """The folder; None if it is elsewhere."""
+        """The folder; None if it is remote."""
         return None if is_remote(self.address) else Path(self.address)
 
     # ---- the batch -------------------------------------------------------------------------------
     def require_free(self, *, resume: bool) -> None:
-        """See that a batch may begin here, or be gone on with; nothing is written.
+        """Check that a batch may begin here, or be continued; nothing is written.
 
         Raises
         ------
         DatasetError
-            If the place holds something else, or a batch that is not to be gone on with.
+            If it contains other files, or a batch that should not be continued.
         """
         folder = self.folder
         if folder is not None and folder.exists() and not folder.is_dir():
@@ -82,7 +82,7 @@ class Results:
             )
 
     def begin(self) -> None:
-        """Make the place, after `require_free`.
+        """Create it, after `require_free`.
 
         Raises
         ------
@@ -98,14 +98,14 @@ class Results:
             ) from error
 
     def is_there(self) -> bool:
-        """Whether this computer sees the batch."""
+        """Return whether this computer sees the batch."""
         if self.folder is not None:
             return (self.folder / BATCH_FILE).is_file()
         with self._files() as (files, root):
             return bool(files.exists(f"{root}/{BATCH_FILE}"))
 
     def rows_of(self, jobs: list[Job]) -> dict[str, dict[str, Any]]:
-        """Read the rows of jobs that were finished before, by their keys."""
+        """Read the rows of finished jobs, by their keys."""
         if self.folder is not None:
             found = {
                 key: row
@@ -124,7 +124,7 @@ class Results:
 
     @contextlib.contextmanager
     def table(self) -> Iterator[Path]:
-        """Have a folder for the files of the table; they are at the place after the ``with``."""
+        """Give a folder for the files of the table; the end of the ``with`` uploads them."""
         if self.folder is not None:
             yield self.folder
             return
@@ -134,7 +134,7 @@ class Results:
 
     # ---- stopping --------------------------------------------------------------------------------
     def forbid_beginning(self) -> None:
-        """Let no more runs begin, on any worker."""
+        """Prevent further runs on all workers."""
         self._write(_STOP_FILE, {})
 
     def allow_beginning(self) -> None:
@@ -150,7 +150,7 @@ class Results:
 
     # ---- a run -----------------------------------------------------------------------------------
     def count_beginning(self, key: str, session: str) -> int:
-        """Note that a run begins, and return how often it did in this session of the batch."""
+        """Record the start of a run, and return its number of starts in this session."""
         name = f"runs/{key}/{_BEGUN_FILE}"
         noted = self._read(name) or {}
         times = int(noted["times"]) + 1 if noted.get("session") == session else 1
@@ -160,7 +160,7 @@ class Results:
 
     @contextlib.contextmanager
     def of_run(self, key: str) -> Iterator[Path]:
-        """Have the folder of a run; what is in it is at the place after the ``with``."""
+        """Give the folder of a run; its contents are uploaded at the end of the ``with``."""
         if self.folder is not None:
             yield self.folder / "runs" / key
             return
@@ -241,7 +241,7 @@ class Results:
 
     @contextlib.contextmanager
     def _files(self) -> Iterator[tuple[Any, str]]:
-        """Have fsspec's file system and the path in it; its errors become ours."""
+        """Return fsspec's file system and the path in it; its errors become ours."""
         fsspec = importlib.import_module("fsspec")
         try:
             files, root = fsspec.core.url_to_fs(self.address)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sizes in bytes, as people write them: ``20GB``."""
+"""Sizes in bytes, in the usual form: ``20GB``."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ def bytes_of(size: str | int, what: str, example: str, least: int = 1) -> int:
     Parameters
     ----------
     size
-        What was given; a number alone is one of bytes.
+        The text; a number alone is in bytes.
     what
-        What it is called, for the message.
+        Its name, for the message.
     example
         A size to give.
     least
-        The smallest that makes sense, in bytes.
+        The smallest useful size, in bytes.
 
     Raises
     ------
     SettingsError
-        If it is none, or too small.
+        If it is no size, or too small.
     """
     found = _SIZE.fullmatch(str(size))
     if found:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs that differ in their seeds alone, put together: median and range."""
+"""Groups of runs that differ only in their seeds: median and range."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ class Spread:
 
     @classmethod
     def of(cls, rows: list[dict[str, Any]], name: str) -> Spread | None:
-        """Take a figure of all runs that have it; None if none has."""
+        """Summarise a figure of all runs that have it; None if none has."""
         found = [float(row[name]) for row in rows if row.get(name) is not None]
         return cls(statistics.median(found), min(found), max(found)) if found else None
 
 
 @dataclass(frozen=True)
 class Group:
-    """Runs that differ in their seeds alone.
+    """Runs that differ only in their seeds.
 
     Attributes
     ----------
     setting
         What they have in common.
     n_runs, n_failed
-        How many there are, and how many of them failed.
+        Their number, and how many of them failed.
     ate_rmse_m, tracked_fraction, frames_per_second, peak_memory_mb
-        Median and range of those that did not; None if nothing is known.
+        Median and range of those that did not fail; None if unknown.
     """
 
     setting: str
@@ -47,7 +47,7 @@ class Group:
 
 
 def summarise(rows: list[dict[str, Any]]) -> list[Group]:
-    """Put runs that differ in their seeds alone together, in the order of their names."""
+    """Group runs that differ only in their seeds, in the order of their names."""
     groups: dict[str, list[dict[str, Any]]] = {}
     for row in sorted(rows, key=lambda row: str(row["run"])):
         groups.setdefault(str(row["setting"]), []).append(row)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keys of settings and configuration that vary: all combinations of a grid, or random draws."""
+"""Varied keys of settings and configuration: a grid of all combinations, or random values."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class Sweep:
     grid
         Values by key.
     ranges
-        Lower and upper end by key, and whether draws are even in the logarithm.
+        Lower and upper end by key, and whether values are uniform in the logarithm.
     n_draws
-        How many random draws; 0: all points of the grid.
+        Number of random points; 0: all points of the grid.
     seed
         Seed of the draws.
     """
@@ -56,9 +56,9 @@ class Sweep:
     seed: int = 0
 
     def points(self) -> Iterator[tuple[tuple[str, float], ...]]:
-        """Yield the values of each point; one without any if nothing is swept.
+        """Yield the values of each point; one empty point if nothing is varied.
 
-        Draws differ; there are fewer than asked for if fewer different ones exist.
+        Points differ; there are fewer than requested if fewer different ones exist.
         """
         if not self.n_draws:
             names = [name for name, _ in self.grid]
@@ -90,12 +90,12 @@ def read_sweep(values: Any) -> Sweep:
     ----------
     values
         Keys of the settings with a list of values, or with ``from`` and ``to`` (and ``log: true``);
-        ``random`` with the number of draws, and ``seed``.
+        ``random`` with the number of points, and ``seed``.
 
     Raises
     ------
     SettingsError
-        If a key is none, or values make no sense or are not allowed.
+        If a key is unknown, or values are invalid or not allowed.
     """
     if not isinstance(values, Mapping) or not set(values) - set(_OTHER_KEYS):
         is_other = values is not None and not isinstance(values, Mapping)
@@ -172,7 +172,7 @@ def _values(name: str, listed: list[Any]) -> tuple[float, ...]:
 
 
 def _require_different_draws(sweep: Sweep) -> None:
-    """Refuse more draws than there are different ones."""
+    """Refuse more points than there are different ones."""
     n_different = sum(1 for _ in sweep.points()) if sweep.n_draws else 0
     if n_different < sweep.n_draws:
         raise SettingsError(
@@ -212,5 +212,5 @@ def _end(name: str, which: str, value: Any) -> float:
 
 
 def _rounded(name: str, value: float) -> float:
-    """Whole numbers for keys that have such, else four digits: names of folders stay short."""
+    """Return whole numbers for keys that need them, else four digits for short names."""
     return round(value) if _KEYS[name].kind is int else float(f"{value:.4g}")

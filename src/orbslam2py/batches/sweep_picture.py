@@ -17,22 +17,22 @@ _ERROR = "ate_rmse_m"
 
 
 def write_sweep_picture(path: Path, rows: list[dict[str, Any]]) -> bool:
-    """Draw the error of every run over each swept key, a colour for each sequence.
+    """Draw the error of every run over each varied key, one colour for each sequence.
 
-    Runs that failed or tracked too little for an error stand as crosses at the bottom, so that no
-    run is left out. A line joins the medians where a value was used more than once.
+    Runs that failed, or tracked too little for an error, are crosses at the bottom, so that no run
+    is left out. A line joins the medians where a value was used more than once.
 
     Parameters
     ----------
     path
-        The file; the ending tells the format.
+        The file; its suffix determines the format.
     rows
         The table of the batch.
 
     Returns
     -------
     bool
-        False if nothing was swept; there is no file then.
+        False if nothing was varied; then there is no file.
 
     Raises
     ------

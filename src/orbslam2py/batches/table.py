@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of a batch as one table: SQLite, CSV, and Parquet where pyarrow is installed."""
+"""The results of a batch as one table: SQLite, CSV, and Parquet if pyarrow is installed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LEAST, _LARGEST = -(2**63), 2**63 - 1
 
 
 def columns_of(rows: Iterable[dict[str, Any]]) -> list[str]:
-    """Return the columns of all rows: what they are of, the figures, and last what was measured."""
+    """Return the columns of all rows: description, figures, and measured values last."""
     names = {name for row in rows for name in row}
     measured = [name for name in sorted(names) if is_measured(name)]
     first = [name for name in _FIRST if name in names]
@@ -34,16 +34,16 @@ def columns_of(rows: Iterable[dict[str, Any]]) -> list[str]:
 
 
 def is_measured(name: str) -> bool:
-    """Whether a column is of what was measured, which differs between runs of the same bytes."""
+    """Return whether a column has measured values, which differ between equal runs."""
     return name in MEASURED or name.startswith("milliseconds.")
 
 
 def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
     """Write ``results.sqlite``, ``results.csv`` and, with pyarrow, ``results.parquet``.
 
-    Rows are in the order of their names, whatever the order in which the runs ended. What a file
-    cannot hold as it is stands there as text: whole numbers beyond 64 bits with a sign, and names
-    of files that are no text, as far as they can be read.
+    Rows are in the order of their names, not in the order in which the runs ended. Values that a
+    file cannot hold become text: signed integers beyond 64 bits, and names of files that are no
+    valid text, as far as they can be read.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
 
 
 def printable(text: str) -> str:
-    """Spell a text that may hold names of files so that every file and font can hold it."""
+    """Return a text that may contain file names in a form for every file and font."""
     try:
         return printable_name(text)
     except UnicodeEncodeError:  # half of a character, which no byte of a name stands for
@@ -81,7 +81,7 @@ def printable(text: str) -> str:
 
 
 def _storable(value: Any) -> bool | int | float | str | None:
-    """Bring a value into a form that all files of the table can hold."""
+    """Convert a value to a form that all files of the table can hold."""
     if value is None or isinstance(value, bool | np.bool_):
         return None if value is None else bool(value)
     if is_whole(value):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One run of a batch, where a worker makes it."""
+"""One run of a batch, in a worker."""
 
 from __future__ import annotations
 
@@ -52,30 +52,30 @@ def run_job(
     cache: Cache | None = None,
     session: str | None = None,
 ) -> dict[str, Any] | None:
-    """Make a run, leave its files in a folder of its own, and return its row of the table.
+    """Make a run, write its files into a separate folder, and return its row of the table.
 
-    Never raises for what is wrong with the run: the row says it. A Ctrl-C, for which the run itself
-    ends early, goes on to the caller, and the run counts as not made.
+    Errors of the run are not raised: the row contains them. Ctrl-C ends the run early, is raised to
+    the caller, and the run counts as not made.
 
     Parameters
     ----------
     job
         What to run.
     results
-        The place of the batch.
+        The location of the batch.
     threads
         Threads that OpenCV may use.
     page
         Write ``report.html`` as well.
     cache
-        Where sequences from elsewhere go; the user's if None.
+        Folder for remote sequences; None: the user's cache.
     session
-        Tells runs that were begun by this batch from those that an earlier one began.
+        Identification of this session: runs with another one were begun by an earlier batch.
 
     Returns
     -------
     dict or None
-        None if the batch is being stopped: the run was not begun.
+        The row; None if the batch is being stopped and the run was not begun.
     """
     cv2.setNumThreads(threads)
     _forget_peak_memory()
@@ -109,7 +109,7 @@ def run_job(
 
 
 def _run(job: Job, path: Path, folder: Path, row: dict[str, Any], *, page: bool) -> None:
-    """Run what is at a path, and put the figures into the row."""
+    """Run the sequence at a path, and put the figures into the row."""
     if not path.exists():
         raise DatasetError(
             f"{job.path} does not exist on {platform.node()}; put the sequences where all "
@@ -142,7 +142,7 @@ def failed_row(job: Job, reason: str) -> dict[str, Any]:
 
 
 def _mark_as_ended(results: Results, job: Job, row: dict[str, Any]) -> None:
-    """Keep the row; a disk that takes nothing more is not the run's failure alone."""
+    """Store the row; an error of the disk concerns more than this run."""
     try:
         results.write_row(job.key, row)
     except (OrbSlamError, OSError) as error:
@@ -170,7 +170,7 @@ def _begun(job: Job) -> dict[str, Any]:
 
 
 def _figures(report: dict[str, Any]) -> dict[str, Any]:
-    """Flatten a report: figures, texts, how many entries lists have, medians of the times."""
+    """Flatten a report: figures, texts, lengths of lists, medians of the times."""
     row: dict[str, Any] = {}
     for name, value in report.items():
         if name in _LEFT_OUT:
@@ -193,7 +193,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _forget_peak_memory() -> None:
-    """Begin anew with the greatest memory of this process, which has made other runs before."""
+    """Reset the peak memory of this process, which has made other runs before."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the runs of a batch are to be made, checked before anything is begun."""
+"""The workers of a batch, checked before the start."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _OTHER_PROTOCOL = re.compile(r"(?!tcp://)[a-z]+://\S+")
 
 @dataclass(frozen=True)
 class Workers:
-    """Who makes the runs of a batch.
+    """The workers of a batch.
 
     Attributes
     ----------
     scheduler
-        Address of a scheduler that runs; None for workers of this batch's own.
+        Address of a running scheduler; None: the batch starts its own workers.
     count
-        Workers to start; None: one a core; 0: none, this process makes the runs.
+        Number of workers to start; None: one per core; 0: none, this process makes the runs.
     memory_limit
-        Of each worker that is started, in bytes; None: an equal part of the computer's.
+        Limit for each started worker, in bytes; None: an equal share of the computer's memory.
     """
 
     scheduler: str | None = None
@@ -46,7 +46,7 @@ class Workers:
 
     @classmethod
     def of(cls, scheduler: Any, count: Any, memory_limit: Any) -> Workers:
-        """Take what a caller gives.
+        """Check the arguments of a caller.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Workers:
         Raises
         ------
         SettingsError
-            If a value makes no sense, or has no meaning beside the others.
+            If a value is invalid, or useless together with the others.
         """
         if scheduler is not None:
             _require_address(scheduler)

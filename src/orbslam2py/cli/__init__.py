@@ -12,7 +12,7 @@ from orbslam2py.cli.terminal_encoding import accept_all_letters
 
 
 def main() -> None:
-    """Run the command line; errors a person can act on become one message and an exit code."""
+    """Run the command line; expected errors become one message and an exit code."""
     accept_all_letters()
     with EndingSignals() as ending:
         try:

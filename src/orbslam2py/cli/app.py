@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Assembles the subcommands and turns errors into messages and exit codes.
 
-A subcommand is loaded when it is asked for: most need libraries that take longer to load than a
-list of commands may take.
+A subcommand is loaded on demand: most need libraries that load more slowly than a list of commands
+should take.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _WIDE = 120
 
 @dataclass(frozen=True)
 class Subcommand:
-    """A command, or a group of them, that is not loaded yet."""
+    """A command, or a group of commands, that is not loaded yet."""
 
     module: str
     """In this package."""
@@ -43,7 +43,7 @@ class Subcommand:
     summary: str
     """The first line of its help, for the list of commands."""
     command_class: str | None = None
-    """A module of this package and its class of commands, for arguments that typer cannot read."""
+    """A module of this package and its class of commands, for arguments that typer cannot parse."""
 
     def load(self) -> Callable[..., None] | typer.Typer:
         """The function, or the group."""
@@ -68,7 +68,7 @@ class Subcommand:
 
 
 def _without_boxes(command: Any) -> None:
-    """Let the help of a command, or of all in a group, be plain text: no name is cut then."""
+    """Let the help of a command, or of all in a group, be plain text: then no name is cut."""
     commands = getattr(command, "commands", None)
     if commands is not None:  # plain text would cut the summaries in the list of a group
         for one in commands.values():
@@ -164,7 +164,7 @@ SUBCOMMANDS = {
 
 
 class _Group(typer.core.TyperGroup):
-    """Loads a subcommand when it is asked for; leaves names of classes out of wrong usage."""
+    """Loads a subcommand on demand; leaves class names out of usage errors."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -180,7 +180,7 @@ class _Group(typer.core.TyperGroup):
         return list(super().parse_args(ctx, args))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The subcommand itself, but only its name and summary for a list of them."""
+        """Return the subcommand, or for a list of commands only its name and summary."""
         if self._lists or cmd_name not in SUBCOMMANDS:
             return super().get_command(ctx, cmd_name)
         if cmd_name not in self._built:
@@ -220,7 +220,7 @@ _MAY_BE_EMPTY = ("--note",)
 
 
 def refuse_empty(arguments: Sequence[str]) -> None:
-    """Raise `SettingsError` for an empty argument, as a shell makes of a variable that is not set.
+    """Raise `SettingsError` for an empty argument, which a shell makes of an unset variable.
 
     As a path it would be the present folder.
     """
@@ -253,7 +253,7 @@ def _options(
 
 
 def run_app() -> None:
-    """Run the subcommand; errors a person can act on become one message and an exit code."""
+    """Run the subcommand; expected errors become one message and an exit code."""
     outlive_the_reader()
     try:
         app()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A reader that has seen enough (``| head``) ends what is printed, not what is done."""
+"""A closed output pipe (``| head``) stops the output, but not the run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sys
 
 
 class _Pipe(io.FileIO):
-    """Standard output into a pipe; once nobody reads it any more, all goes nowhere."""
+    """Standard output into a pipe; after its reader has closed it, output is dropped."""
 
     def write(self, data: object, /) -> int:
         """Write bytes."""
@@ -24,7 +24,7 @@ class _Pipe(io.FileIO):
 
 
 def outlive_the_reader() -> None:
-    """Go on when whoever reads standard output has closed it: files are still to be written."""
+    """Continue after the reader of standard output has closed it: files must still be written."""
     out = sys.stdout
     if out is not sys.__stdout__ or not isinstance(out, io.TextIOWrapper):
         return  # somebody catches what is printed

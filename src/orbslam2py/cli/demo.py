@@ -75,7 +75,7 @@ def demo(
 
 
 def own_name() -> str:
-    """What a person types to call this program, also from where it is not on the path."""
+    """Return the command that calls this program, also if it is not on the path."""
     own = Path(sys.argv[0])
     if own.name == "__main__.py":
         return f"{_from_here(Path(sys.executable))} -m orbslam2py"
@@ -86,6 +86,6 @@ def own_name() -> str:
 
 
 def _from_here(path: Path) -> Path:
-    """A path as it is typed in the working folder: below it without what leads there."""
+    """Return a path for the command line: relative, if it is below the working folder."""
     absolute, here = path.absolute(), Path.cwd()
     return absolute.relative_to(here) if absolute.is_relative_to(here) else path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person sees of a run: its progress, and the figures at the end."""
+"""Output of a run for the user: its progress, and the figures at the end."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from orbslam2py.slam.system import System
 
 
 def progress_bar(console: Console) -> Progress:
-    """A bar that leaves no trace when it is done."""
+    """A bar that disappears at the end."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -37,7 +37,7 @@ def progress_bar(console: Console) -> Progress:
 
 
 class Display:
-    """Keeps the progress bar up to date, at most ten times a second."""
+    """Updates the progress bar, at most ten times a second."""
 
     def __init__(self, bar: Progress, total: int | None) -> None:
         self._bar = bar
@@ -64,7 +64,7 @@ class Display:
 
 
 def report_table(report: dict[str, Any]) -> Table:
-    """What report.json says about how well it went, for reading; the rest is left to the page."""
+    """Return the main figures of report.json as text; the page has the others."""
     title = escape(f"{report['sequence']} ({report['sensor']})")
     table = Table(title=title, show_header=False)
     table.add_column(justify="left")

@@ -282,7 +282,7 @@ def _truth_of_sequence(folder: Path, sensor: Sensor | None, extrinsics: FloatArr
 
 
 def _of_camera(path: Path, body: Poses, extrinsics: FloatArray | None) -> Poses:
-    """Poses of the camera from those of the body: with T_BS of cam0 where EuRoC puts it."""
+    """Convert poses of the body to those of the camera, with T_BS of EuRoC's cam0."""
     if extrinsics is None:
         if body.file_format is not TrajectoryFormat.EUROC:
             return body
@@ -301,7 +301,7 @@ def _of_camera(path: Path, body: Poses, extrinsics: FloatArray | None) -> Poses:
 
 
 def _sensor_of_run(trajectory: Path) -> Sensor | None:
-    """The sensor of the run that a file belongs to, by its report; None if that is not known."""
+    """Return the sensor of a file's run, from its report; None if unknown."""
     try:
         report = json_module.loads((trajectory.parent / "report.json").read_text(encoding="utf-8"))
         return Sensor(report["sensor"])

@@ -9,13 +9,13 @@ class ExitCode(IntEnum):
 
     OK = 0
     FAILED = 1
-    """Something broke in the middle; what was done until then is saved. Two files differ."""
+    """Something failed during the run; the results so far are saved. Two files differ."""
     BAD_INPUT = 2
     """Bad input or usage; nothing was run."""
     NOTHING_TRACKED = 3
     HUNG_UP = 129
-    """The terminal was closed (SIGHUP); what was done until then is saved."""
+    """The terminal was closed (SIGHUP); the results so far are saved."""
     INTERRUPTED = 130
-    """Ctrl-C; what was done until then is saved."""
+    """Ctrl-C; the results so far are saved."""
     TERMINATED = 143
-    """Asked to end (SIGTERM); what was done until then is saved."""
+    """Termination was requested (SIGTERM); the results so far are saved."""

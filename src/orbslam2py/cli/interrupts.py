@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ctrl-C, and what else asks for an end, as a request: nothing is broken off half-way."""
+"""Ctrl-C and other signals as requests: no step is aborted."""
 
 from __future__ import annotations
 
@@ -25,15 +25,14 @@ _ECHO_SECONDS = 1.0
 
 
 class EndingSignals:
-    """In its ``with`` block SIGTERM and SIGHUP interrupt as Ctrl-C does.
+    """In its ``with`` block SIGTERM and SIGHUP have the effect of Ctrl-C.
 
-    Where one is ignored (SIGHUP by ``nohup``) it stays ignored. Processes that are started
-    meanwhile do not inherit it.
+    An ignored signal (SIGHUP by ``nohup``) stays ignored. Child processes do not inherit it.
 
     Attributes
     ----------
     exit_code : ExitCode
-        What to end with if the program was interrupted.
+        Exit code after an interrupt.
     """
 
     def __init__(self) -> None:
@@ -65,7 +64,7 @@ class EndingSignals:
             raise KeyboardInterrupt
 
     def _leave_closed_terminals(self) -> None:
-        """Let what is still said go nowhere, where it would be an error that ends the program."""
+        """Drop further output, which would raise errors."""
         for number in self._terminals:
             if not os.isatty(number):
                 nowhere = os.open(os.devnull, os.O_RDWR)
@@ -74,7 +73,7 @@ class EndingSignals:
 
 
 class _Request(threading.Event):
-    """An event that is known to be set at once, even if the thread that sets it has yet to run."""
+    """An event that counts as set at once, even before the setting thread runs."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -84,7 +83,7 @@ class _Request(threading.Event):
         return self.asked or super().is_set()
 
     def ask(self) -> None:
-        """Be set; may be called by a signal's handler."""
+        """Set the event; a signal handler may call it."""
         self.asked = True
         # By another thread: this one may be about to wait for the event, and hold its lock. Not
         # through threading.Thread, whose own locks it may hold as well.
@@ -94,13 +93,13 @@ class _Request(threading.Event):
 class StopOnInterrupt:
     """In its ``with`` block the first Ctrl-C sets `event`; the next ones interrupt as usual.
 
-    So do the signals of `EndingSignals`. Where Ctrl-C is ignored (a job in the background) it stays
-    ignored.
+    The signals of `EndingSignals` do the same. If Ctrl-C is ignored (a job in the background), it
+    stays ignored.
 
     Attributes
     ----------
     event : threading.Event
-        Set once an end was asked for.
+        Set after the first request.
     """
 
     def __init__(self) -> None:
@@ -132,10 +131,10 @@ class StopOnInterrupt:
 
 @contextlib.contextmanager
 def hold_while_loading() -> Iterator[None]:
-    """Let the first Ctrl-C wait until the libraries of the block are loaded.
+    """Delay the first Ctrl-C until the libraries of the block are loaded.
 
-    Loading takes a second at most, and some libraries drop whatever exception comes up meanwhile or
-    make another one of it: the program would go on, or end with a traceback.
+    Loading takes at most a second. Some libraries drop or replace exceptions meanwhile: the program
+    would continue, or end with a traceback.
 
     Raises
     ------

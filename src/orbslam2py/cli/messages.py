@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is said on the terminal beside results: errors, warnings, notes."""
+"""Messages on the terminal: errors, warnings, notes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.markup import escape
 
 
 def print_error(console: Console, title: str, text: str) -> None:
-    """Print a message in one line: paths can be copied from it."""
+    """Print a message in one line, so that paths can be copied."""
     console.print(f"[bold red]{title}:[/] {escape(text)}", highlight=False, soft_wrap=True)
 
 
@@ -20,10 +20,10 @@ _TOLD_EACH = 3
 
 
 class _ConsoleHandler(logging.Handler):
-    """Prints warnings like errors, in one line each: paths can be copied from it.
+    """Prints warnings like errors, in one line each, so that paths can be copied.
 
-    Of warnings of one kind, which differ only in what they name, the fourth and later ones are
-    counted; `tell_rest` says how many there were.
+    Warnings of one kind differ only in the things that they name. The fourth and later ones are
+    only counted; `tell_rest` prints their number.
     """
 
     def __init__(self, console: Console) -> None:
@@ -43,7 +43,7 @@ class _ConsoleHandler(logging.Handler):
         self._print(record, self.format(record))
 
     def tell_rest(self) -> None:
-        """Print how many warnings were only counted, kind by kind, and begin anew."""
+        """Print how many warnings were only counted, by kind, and reset the counts."""
         for kind, record in self._last.items():
             more = self._counts[kind] - _TOLD_EACH
             text = self.format(record)
@@ -72,7 +72,7 @@ def log_to(console: Console, *, quiet: bool) -> None:
 
 
 def tell_repeated() -> None:
-    """Print how many warnings were only counted because there had been three like them."""
+    """Print how many warnings were only counted, because three equal ones were printed."""
     for handler in logging.getLogger("orbslam2py").handlers:
         if isinstance(handler, _ConsoleHandler):
             handler.tell_rest()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run on the terminal: a bar while it goes, a table at its end, the exit code."""
+"""A run on the terminal: a progress bar, a table at the end, the exit code."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def run_and_show(
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code.
 
-    Of what is written none may be among the `inputs`.
+    No written file may be among the `inputs`.
     """
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
@@ -160,7 +160,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _identity_of(path: Path | None) -> tuple[int, int] | None:
-    """Tell a file from one that takes its place; None if there is none."""
+    """Return the identity of a file, to recognise a replacement; None if there is none."""
     if path is None or not path.exists():
         return None
     status = path.stat()
@@ -168,7 +168,7 @@ def _identity_of(path: Path | None) -> tuple[int, int] | None:
 
 
 def _about_map(result: RunResult, path: Path, before: tuple[int, int] | None) -> str:
-    """Say what the map file holds; a last save that failed has left what there was."""
+    """Print the contents of the map file; if the last save failed, it has the earlier ones."""
     named = f"[bold]{escape(str(path))}[/]"
     if result.saved_map is not None:
         return f"Map saved in {named}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arguments of ``orbslam2py run`` that are more than one word or number."""
+"""Arguments of ``orbslam2py run`` with more than one word or number."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class RunCommand(typer.core.TyperCommand):
     """Takes ``--localize`` with and without a number."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Give ``--localize`` its number 0 where none follows."""
+        """Give ``--localize`` the number 0 if none follows."""
         complete: list[str] = []
         for argument, following in zip_longest(args, args[1:], fillvalue=""):
             complete.append(argument)
@@ -32,7 +32,7 @@ class RunCommand(typer.core.TyperCommand):
 
 
 def read_initial_pose(text: str) -> FloatArray:
-    """Read the pose of a camera in the world: a position, and a unit quaternion if it is turned.
+    """Read the pose of a camera in the world: a position, and optionally a unit quaternion.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def read_initial_pose(text: str) -> FloatArray:
     Raises
     ------
     DatasetError
-        If it is neither three nor seven numbers, or farther away than anything is.
+        If it has neither three nor seven numbers, or is impossibly far away.
     """
     try:
         numbers = np.array([float(number) for number in text.split(",")])

@@ -148,7 +148,7 @@ def list_names() -> None:
 
 
 def _coefficients(text: str | None) -> dict[str, Any]:
-    """The distortion by the names of the fields of `CameraSettings`."""
+    """Return the distortion by the names of the fields of `CameraSettings`."""
     if text is None:
         return {}
     try:
@@ -166,7 +166,7 @@ def _coefficients(text: str | None) -> dict[str, Any]:
 
 
 def _lens(model: str, text: str | None, distortion: str | None) -> dict[str, Any]:
-    """The fields of `CameraSettings` for a fisheye lens; empty for a pinhole."""
+    """Return the fields of `CameraSettings` for a fisheye lens; empty for a pinhole."""
     model = checked_model(model)
     names = ",".join(LENS_PARAMETERS.get(model, ()))
     if model == PINHOLE:

@@ -262,7 +262,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def parse_exposure(text: str) -> float | tuple[float, float]:
-    """Read a factor, or the least and the most of one that jumps: ``0.4:1.5``.
+    """Read a factor, or the least and the greatest value of one that jumps: ``0.4:1.5``.
 
     Raises
     ------
@@ -276,7 +276,7 @@ def parse_exposure(text: str) -> float | tuple[float, float]:
 
 
 def parse_cover(text: str) -> float | tuple[float, float]:
-    """Read seconds, or when they begin and how many they are: ``10:3``.
+    """Read a duration in seconds, or a start and a duration: ``10:3``.
 
     Raises
     ------
@@ -292,7 +292,7 @@ def parse_cover(text: str) -> float | tuple[float, float]:
 
 
 def _one_or_two(text: str) -> float | tuple[float, float] | None:
-    """A number, or two with a colon between them; None for anything else."""
+    """Return a number, or two with a colon between them; None for anything else."""
     try:
         numbers = [float(part) for part in text.split(":")]
     except ValueError:

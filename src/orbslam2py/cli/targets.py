@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files that a command is asked to write: what is nobody's earlier result is not replaced."""
+"""Files that a command writes: only its own earlier results are replaced."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ def check_target(path: Path | None, *, force: bool) -> None:
 
 
 def check_kept(*paths: Path | None, force: bool) -> None:
-    """Raise `OutputFileError` if a file would be replaced that is not to be."""
+    """Raise `OutputFileError` if an existing file must not be replaced."""
     for path in paths:
         if path is not None and path.exists() and not force:
             raise OutputFileError(f"{path} exists; use --force to replace it")
 
 
 def check_apart(outputs: Mapping[str, Path | None], inputs: Iterable[Path] = ()) -> None:
-    """See that no two files that are written are one, and none of them is read.
+    """Check that all written files differ, and that none of them is read.
 
     Parameters
     ----------
     outputs
-        What is written, by the option that asks for it.
+        The written files, by their options.
     inputs
         What is read.
 
     Raises
     ------
     OutputFileError
-        Naming the options, or the file.
+        The message names the options, or the file.
     """
     read = {path.resolve() for path in inputs}
     options: dict[Path, str] = {}
@@ -62,12 +62,12 @@ def check_apart(outputs: Mapping[str, Path | None], inputs: Iterable[Path] = ())
 
 
 def check_page(path: Path, kind: PageKind) -> Path:
-    """See that a page may be written there: only one of the same kind is replaced.
+    """Check that a page may be written there: only one of the same kind is replaced.
 
     Raises
     ------
     OutputFileError
-        If something else has that name.
+        If another file has this name.
     """
     if path.is_dir():
         raise OutputFileError(f"{path} is a folder; give the page a name with --output")
@@ -88,12 +88,12 @@ _OF = {"run": "one run", "comparison": "several runs", "benchmark": "a benchmark
 
 
 def check_figures(path: Path | None, names: Collection[str], *, force: bool) -> None:
-    """See that figures may be written there as JSON: only some of the same names are replaced.
+    """Check that figures may be written there as JSON: only the same ones are replaced.
 
     Raises
     ------
     OutputFileError
-        If something else has that name.
+        If another file has this name.
     """
     if path is None or force or not _holds_something(path):
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A terminal that cannot spell a letter gets a question mark, not a traceback."""
+"""On a terminal that cannot show a letter, print a question mark instead of a traceback."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _HANDLER = "orbslam2py.question_marks"
 
 
 def _question_marks(error: UnicodeError) -> tuple[bytes, int]:
-    """Write bytes of names of files as they are, and ? for each letter that cannot be written."""
+    """Write bytes of file names unchanged, and ? for each letter that cannot be written."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     letters = map(ord, error.object[error.start : error.end])
@@ -21,7 +21,7 @@ def _question_marks(error: UnicodeError) -> tuple[bytes, int]:
 
 
 def accept_all_letters() -> None:
-    """Let standard output and errors take any text, whatever the locale."""
+    """Let standard output and errors accept any text, in any locale."""
     codecs.register_error(_HANDLER, _question_marks)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``orbslam2py view``: a run long past in the viewer."""
+"""``orbslam2py view``: a finished run in the viewer."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The live viewer beside a run: its options, its beginning, and how long it stays."""
+"""The live viewer of a run: its options, its start, and its end."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ ViewerExit = Annotated[
 
 @dataclass(frozen=True)
 class ViewerOptions:
-    """What the command line says about the viewer."""
+    """The options of the viewer on the command line."""
 
     wanted: bool = False
     port: int | None = None
@@ -67,7 +67,7 @@ class ViewerOptions:
 
 
 class Viewing:
-    """The viewer of a run, if one is wanted; entered before it, left when nobody is to look.
+    """The viewer of a run, if requested; entered before the run, left when the viewer ends.
 
     Parameters
     ----------
@@ -76,14 +76,14 @@ class Viewing:
     sequence : Sequence or LiveSource
         What is run.
     in_real_time : bool
-        Images come when they come: what is drawn must not make tracking late.
+        Images come in real time: drawing must not delay tracking.
     stop : threading.Event
-        Ends the run when it is set.
+        Ends the run when set.
 
     Attributes
     ----------
     control : RunControl or None
-        For the run, which the viewer can hold; None for a camera, and without a viewer.
+        Control that lets the viewer pause the run; None for a camera, and without a viewer.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class Viewing:
             self._view.tell_latency(latency_words(row.latency))
 
     def stay(self, console: Console, folder: Path | None) -> None:
-        """Keep the page until Ctrl-C, unless it is to end with the run."""
+        """Keep the page until Ctrl-C, unless it should end with the run."""
         interrupted = self._stop.is_set() and not self._stopped_in_page
         if self._view is None or self._options.exit or interrupted:
             return

@@ -125,7 +125,7 @@ def info(
         Path | None, typer.Argument(help="Vocabulary in any format; default: the package's.")
     ] = None,
 ) -> None:
-    """Check a vocabulary as a whole and show what it holds."""
+    """Check a vocabulary and show its properties."""
     facts = vocabulary_info(path)
     console = Console(highlight=False, soft_wrap=True)
     for name, value in (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run is asked to keep of what could be seen: a video, a recording."""
+"""Files that record a run: a video, a recording."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ _LIVE_MAP_RATE = 10.0
 
 @dataclass
 class FileWatchers:
-    """Watchers that write files, and how they take part in a run.
+    """Watchers that write files, as a part of a run.
 
     Parameters
     ----------
     in_time : bool
-        The run goes in real time: images that come too fast are left out.
+        Whether the run is in real time: then images that come too fast are left out.
     """
 
     in_time: bool
@@ -116,7 +116,7 @@ class FileWatchers:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Close what the run has not, since it did not begin."""
+        """Close files that the run has not closed, because it did not begin."""
         for watcher in self.watchers:
             watcher.close()
 
@@ -138,14 +138,14 @@ class FileWatchers:
             yield
 
     def tell(self, console: Console) -> None:
-        """Say where the files are."""
+        """Print where the files are."""
         for what, path in self.files.items():
             if path.is_file():
                 where = escape(str(path))
                 console.print(f"The {what} is [bold]{where}[/]", highlight=False, soft_wrap=True)
 
     def count(self, row: FrameRow) -> None:
-        """Take note of images that were not tracked."""
+        """Report images that were not tracked."""
         if row.record is not None:
             self._n_tracked += 1
         elif self.video is not None and self._seconds is not None:
@@ -159,12 +159,12 @@ def file_watchers(
     video: Path | None,
     record: Path | None,
 ) -> FileWatchers:
-    """Make what writes the files that were asked for, and see that they can be written.
+    """Create the writers of the requested files, and check that the files can be written.
 
     Raises
     ------
     OrbSlamError
-        Naming the file that cannot be written, or what has to be installed.
+        The message names the file that cannot be written, or the package to install.
     """
     in_time = options.realtime or not is_sequence(source)
     with contextlib.ExitStack() as stack:
@@ -198,7 +198,7 @@ def _truth(source: Sequence | LiveSource) -> Trajectory | None:
 
 
 def _times(source: Sequence | LiveSource, options: RunOptions) -> FloatArray | None:
-    """Time stamps of the images of a recording that are taken."""
+    """Return the time stamps of the used images of a recording."""
     if not is_sequence(source):
         return None
     return np.asarray(source.timestamps)[options.indices(len(source))]

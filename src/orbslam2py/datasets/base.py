@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every data set offers, whatever its layout on disk."""
+"""Interface of all data sets, for any layout on disk."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _log = logging.getLogger(__name__)
 
 
 class Layout(str, Enum):
-    """How a recorded sequence lies on disk."""
+    """The layout of a recorded sequence on disk."""
 
     TUM = "tum"
     KITTI = "kitti"
@@ -48,19 +48,19 @@ class Layout(str, Enum):
 
 @dataclass(frozen=True, eq=False)
 class Images(EqualByValue):
-    """The images of one moment, as the tracking calls take them; equal if all pixels are.
+    """The images of one moment, as the tracking calls take them; equal if all pixels are equal.
 
     Attributes
     ----------
     image
-        Image of the only, left or colour camera: uint8 (h, w), (h, w, 3) or (h, w, 4) with the
-        colour order that the settings declare.
+        Image of the single, left or colour camera: uint8 (h, w), (h, w, 3) or (h, w, 4) with the
+        colour order of the settings.
     right
         Right image of a rectified pair (stereo), else None.
     depth
         Raw depth registered to `image`, single channel (h, w) (RGB-D), else None.
     mask
-        uint8 (h, w): no keypoint lies in `image` where it is 0. None: anywhere.
+        uint8 (h, w): no keypoints in `image` where the mask is 0. None: anywhere.
     """
 
     image: ByteArray
@@ -71,12 +71,12 @@ class Images(EqualByValue):
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame of a sequence, as a loop over the sequence gives it.
+    """A frame of a sequence, as a loop over the sequence yields it.
 
     Attributes
     ----------
     index
-        Place in the sequence, from 0.
+        Number in the sequence, from 0.
     timestamp
         Seconds.
     text
@@ -111,18 +111,18 @@ class Frame:
 
 
 class Source(Protocol):
-    """Where images come from, opened for one sensor.
+    """A source of images, opened for one sensor.
 
     Attributes
     ----------
     name
         Name of the folder, the file, the camera or the world.
     layout
-        How it lies on disk, or ``camera``.
+        Layout on disk, or ``camera``.
     sensor
-        What it delivers images for.
+        The sensor.
     settings
-        Given by the caller, or chosen by what comes with the images.
+        The settings given by the caller, or chosen by the files beside the images.
     """
 
     @property
@@ -135,7 +135,7 @@ class Source(Protocol):
     def settings(self) -> Settings: ...  # noqa: D102
 
     def ground_truth(self) -> Trajectory | None:
-        """Return the true poses ``T_wc`` of the only, left (rectified) or colour camera.
+        """Return the true poses ``T_wc`` of the single, left (rectified) or colour camera.
 
         Returns
         -------
@@ -258,13 +258,13 @@ class LiveSource(Source, Protocol):
 class Sequence(Source, Protocol):
     """A sequence of known length, recorded or made up; see `Source`.
 
-    The ``index`` of a frame is its place in the sequence, from 0, whichever frames a run takes.
+    The ``index`` of a frame is its number in the sequence, from 0, also if a run skips frames.
 
     Attributes
     ----------
     timestamps
-        Time of every frame in seconds, float64 (n,). Those of this package's sequences are
-        read-only: ``sequence.timestamps - sequence.timestamps[0]`` makes an array of one's own.
+        Time of every frame in seconds, float64 (n,). The arrays of this package's sequences are
+        read-only: ``sequence.timestamps - sequence.timestamps[0]`` makes a new array.
     """
 
     @property
@@ -280,19 +280,19 @@ class Sequence(Source, Protocol):
         Parameters
         ----------
         index
-            Place of the frame in the sequence, from 0.
+            Number of the frame in the sequence, from 0.
         """
         ...
 
     def default_settings(self) -> Settings:
-        """Choose settings by what comes with the images.
+        """Choose settings by the files beside the images.
 
         Raises
         ------
         DatasetError
-            If nothing tells them, listing what can be done.
+            If there are none, with a list of remedies.
         SettingsError
-            If a settings file that comes with the images is wrong.
+            If a settings file beside the images is invalid.
         """
         ...
 
@@ -302,7 +302,7 @@ class Sequence(Source, Protocol):
         Parameters
         ----------
         index
-            Place of the frame in the sequence, from 0.
+            Number of the frame in the sequence, from 0.
 
         Raises
         ------
@@ -317,7 +317,7 @@ class Sequence(Source, Protocol):
 
 
 class IterableSequence(Sequence, Protocol):
-    """A `Sequence` with a loop over its frames, which `FramesInOrder` has ready."""
+    """A `Sequence` that can be iterated, by `FramesInOrder`."""
 
     def __iter__(self) -> Iterator[Frame]:
         """Read the frames one after the other, from the first."""
@@ -337,7 +337,7 @@ class Stamps:
     lines
         Line number of each in the file, from 1.
     doubts
-        What was changed in them, or may be wrong, one sentence each.
+        Changes and doubts, one sentence each.
     """
 
     seconds: FloatArray
@@ -352,7 +352,7 @@ class Stamps:
 
 
 def rate_of(seconds: FloatArray, usual: float) -> float:
-    """Return images per second by the usual step, or `usual` if no time grows."""
+    """Return images per second by the usual step, or `usual` if no time increases."""
     steps = np.diff(seconds)
     steps = steps[steps > 0]
     # Rounded, since times are written with few digits: 9.99999 would count as 9 frames.
@@ -362,16 +362,16 @@ def rate_of(seconds: FloatArray, usual: float) -> float:
 def choose_sensor(
     folder: Path, wanted: Sensor | str | None, available: tuple[Sensor, ...]
 ) -> Sensor:
-    """Return the wanted sensor, or the richest available one.
+    """Return the requested sensor, or the richest available one.
 
     Parameters
     ----------
     folder
-        Where the images are, for the message.
+        Folder of the images, for the message.
     wanted
         None for the richest.
     available
-        Sensors there are images for, the richest first.
+        Sensors that there are images for, the richest first.
 
     Raises
     ------

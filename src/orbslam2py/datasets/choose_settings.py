@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which settings a sequence is used with when the user names none."""
+"""The settings of a sequence if the user gives none."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ def choose_settings(
 ) -> Settings:
     """Choose the settings for a sequence by its folder.
 
-    In this order: ``settings.yaml`` in the folder, the calibration that came with the data, the
-    TUM camera that the folder's name tells, or that of a link to it.
+    In this order: ``settings.yaml`` in the folder, the calibration of the data, the TUM camera in
+    the name of the folder or of a link to it.
 
     Parameters
     ----------
     sensor
-        What the settings are for.
+        The sensor of the settings.
     folders
-        Where ``settings.yaml`` may lie; the names of the first one, followed to its place and as it
-        was given, may tell the camera.
+        Folders that may contain ``settings.yaml``. The name of the first one, as given and without
+        links, may tell the camera.
     from_calibration
-        Makes settings of the data's own calibration, None if there is none.
+        Makes settings of the data's own calibration; returns None if there is none.
     advice
-        What is missing in data of this layout and what to do about it, for the message.
+        What is missing in data of this layout, and the remedy, for the message.
 
     Raises
     ------
     SettingsError
-        If the file found is wrong.
+        If the file is invalid.
     DatasetError
         If nothing was found, with the advice; or if the calibration is malformed.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time stamps of a list as people have them: their unit, their order, and equal ones.
+"""Time stamps of a list as users write them: their unit, their order, and equal ones.
 
-One mechanism for all lists of images. What it changes it says in a warning.
+One mechanism serves all lists of images. It reports its changes in a warning.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ class Clock:
     Attributes
     ----------
     order
-        Places in the list, in the order of time.
+        Line numbers of the list, in the order of time.
     nanoseconds
         Time of each, growing.
     texts
-        The same as text in seconds; the text of the source where nothing was changed.
+        The same as text in seconds; unchanged times keep the text of the source.
     doubts
-        What was changed, or may be wrong, one sentence each. All were logged.
+        Changes and doubts, one sentence each. All were logged.
     """
 
     order: tuple[int, ...]
@@ -81,7 +81,7 @@ class Clock:
 def read_clock(
     source: Path | str, texts: Sequence[str], fps: float | None, *, usual_unit: int = 0
 ) -> Clock:
-    """Understand the times of a list.
+    """Interpret the times of a list.
 
     Parameters
     ----------
@@ -92,8 +92,7 @@ def read_clock(
     fps
         Images per second by the settings, if they are known.
     usual_unit
-        Digits of a second that the times of such lists count, so that nothing is said of it: 9 for
-        nanoseconds.
+        Usual digits of a second in such lists, for which there is no note: 9 for nanoseconds.
 
     Raises
     ------
@@ -137,7 +136,7 @@ def text_of(nanoseconds: int) -> str:
 
 
 def is_time(text: str) -> bool:
-    """Whether a text is a number or a date."""
+    """Return whether a text is a number or a date."""
     try:
         value_of("", text)
     except DatasetError:
@@ -182,10 +181,10 @@ def value_of(source: Path | str, text: str) -> Decimal:
 
 
 def unit_of(values: Sequence[Decimal], fps: float | None) -> int:
-    """Return the digits of a second that times count: 0 for seconds, 9 for nanoseconds.
+    """Return the digits of a second of the unit: 0 for seconds, 9 for nanoseconds.
 
-    The unit is the one in which the usual step fits the frame rate. Images may have been left out:
-    long steps stay seconds as long as another unit does not fit far better.
+    The unit is that in which the usual step fits the frame rate. Images may be missing: long steps
+    count as seconds unless another unit fits far better.
     """
     largest = _largest(values)
     for digits, least in _SINCE_1970.items():
@@ -211,10 +210,9 @@ def _is_since_1970(values: Sequence[Decimal]) -> bool:
 
 
 def was_set_back(times: Sequence[int]) -> bool:
-    """Whether a clock was set back: times grow, step back once or a few times, and grow on.
+    """Return whether a clock was set back: increasing times with a few jumps back.
 
-    A list in which few lines stand at a wrong place, or which is in no order at all, is in
-    disorder instead.
+    A list with a few misplaced lines, or without any order, is unordered instead.
     """
     n = len(times)
     back = sum(later < earlier for earlier, later in pairwise(times))
@@ -223,7 +221,7 @@ def was_set_back(times: Sequence[int]) -> bool:
 
 
 def _longest_rise(times: Sequence[int]) -> int:
-    """Length of the longest subsequence that does not fall."""
+    """Return the length of the longest subsequence that does not decrease."""
     ends: list[int] = []
     for time in times:
         place = bisect.bisect_right(ends, time)
@@ -232,7 +230,7 @@ def _longest_rise(times: Sequence[int]) -> int:
 
 
 def _continued(source: Path | str, times: Sequence[int], doubts: list[str]) -> list[int]:
-    """Move the times after each place where the clock was set back."""
+    """Move the times after each jump back of the clock."""
     step = _usual_step(times)
     continued, shift = [times[0]], 0
     for place, (earlier, later) in enumerate(pairwise(times)):
@@ -255,7 +253,7 @@ def _usual_step(times: Sequence[int]) -> int:
 def _spread(
     source: Path | str, times: Sequence[int], fps: float | None, doubts: list[str]
 ) -> list[int]:
-    """Spread images of equal times until the next time."""
+    """Distribute images of equal times up to the next time."""
     groups: list[tuple[int, int]] = []  # first place, number of images
     for place, time in enumerate(times):
         if groups and times[groups[-1][0]] == time:

@@ -33,7 +33,7 @@ _BY_NAME = 0.5
 
 @dataclass(frozen=True)
 class FolderKind:
-    """What a folder of images holds, recognised by its first image.
+    """The contents of a folder of images, recognised by its first image.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class FolderKind:
     kind
         ``colour`` (8 bits), ``depth`` (16 bits or floating point, one channel) or ``other``.
     pixels
-        How its images are called in messages.
+        Name of its images in messages.
     size
         Width and height of the first one.
     """
@@ -68,7 +68,7 @@ class DepthPair:
 
 
 def folder_kinds(folder: Path) -> list[FolderKind]:
-    """Look at the first image of every sub-folder that has images.
+    """Examine the first image of every sub-folder with images.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def folder_kinds(folder: Path) -> list[FolderKind]:
 
 
 def is_depth_name(name: str) -> bool:
-    """Tell whether a folder is called as if it held depth."""
+    """Return whether the name of a folder suggests depth."""
     return _DEPTH_NAME.search(name) is not None
 
 
@@ -93,13 +93,13 @@ def find_depth_pair(folder: Path) -> DepthPair | None:
 
 
 def told_by_names(folder: Path) -> bool:
-    """Whether the images' folder is known by its name, also beside others with images."""
+    """Whether the folder of the images is recognised by its name, also beside other folders."""
     pair = find_depth_pair(folder)
     return pair is not None and _COLOUR_NAME.match(pair.colour.path.name) is not None
 
 
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
-    """Say what is in a folder that should have had images and depth, and what to do."""
+    """Return a message: the contents of a folder without images and depth, and the remedy."""
     has = ", ".join(map(str, kinds))
     alone = ", or give one of these folders alone (--sensor mono)" if len(kinds) > 1 else ""
     only_depth = len(kinds) > 1 and all(one.kind == "depth" for one in kinds)
@@ -115,29 +115,29 @@ def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
 class DepthFolders(UnlistedSequence):
     """Images and depth images in two folders side by side; see `datasets.base.Sequence`.
 
-    The folders are recognised by the first image of each, and by their names if several fit.
-    Images and depth belong together by time if all names are times, else by equal names, else by
-    their order if there are as many of both.
+    The folders are recognised by the first image of each, and by their names if several fit. Images
+    and depth images are paired by time if all names are times, else by equal names, else by their
+    order if there are as many of both.
 
     Parameters
     ----------
     folder
-        Where the two folders are.
+        The folder that contains the two folders.
     sensor
         RGB-D or monocular; by default RGB-D.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
     fps
-        Images per second; by default the names if they are times, else the rate of the settings.
+        Images per second; by default the times in the names, else the rate of the settings.
     times
         File with one time stamp per image.
 
     Raises
     ------
     DatasetError
-        If the folders cannot be told, or what belongs together, or the time stamps do not fit.
+        If the folders or the pairs are not clear, or the time stamps do not fit.
     SettingsError
-        If the settings are wrong.
+        If the settings are invalid.
     """
 
     layout = "images and depth"
@@ -198,7 +198,7 @@ def _kind_of(folder: Path, files: list[Path]) -> FolderKind:
 
 
 def _only(candidates: list[FolderKind], name: re.Pattern[str]) -> FolderKind | None:
-    """The only one; of several the only one that is called so."""
+    """Return the single item; of several, the single one with this name."""
     if len(candidates) > 1:
         candidates = [one for one in candidates if name.match(one.path.name)]
     return candidates[0] if len(candidates) == 1 else None
@@ -214,7 +214,7 @@ def _require_equal_view(pair: DepthPair) -> None:
 def _paired(
     folder: Path, pair: DepthPair, images: list[Path]
 ) -> tuple[list[Path], list[Path], str]:
-    """Return images, the depth of each, and how they were paired."""
+    """Return images, the depth of each, and the method of pairing."""
     depths = files_in_time(pair.depth.path)
     colour_stamps, depth_stamps = stamps_of_names(images), stamps_of_names(depths)
     by_name = {path.stem: path for path in depths}
@@ -244,7 +244,7 @@ def _paired(
 
 
 def files_in_time(folder: Path) -> list[Path]:
-    """Images by their time if their names are times, where 0.25 is before 0.5, else by name."""
+    """Return images by their time if their names are times (0.25 before 0.5), else by name."""
     files = image_files(folder)
     if any(seconds_of_name(path.stem) is None for path in files):
         return files

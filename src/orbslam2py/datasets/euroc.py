@@ -45,7 +45,7 @@ _LARGEST_COUNT = 1000
 
 
 def find_root(folder: Path) -> Path | None:
-    """Return the folder that holds ``cam0``: the given one or ``mav0`` in it; None if neither."""
+    """Return the folder of ``cam0``: the given one or its ``mav0``; None if there is none."""
     for root in (folder / "mav0", folder):
         if (root / "cam0" / "data").is_dir() or (root / "cam0" / "data.csv").is_file():
             return root
@@ -54,7 +54,7 @@ def find_root(folder: Path) -> Path | None:
 
 @dataclass(frozen=True)
 class _CameraList:
-    """Image files in the order of time [ns], and where each was listed."""
+    """Return image files in the order of time [ns], with their positions in the list."""
 
     source: Path
     nanoseconds: tuple[int, ...]
@@ -64,31 +64,31 @@ class _CameraList:
     doubts: tuple[str, ...]
 
     def since(self, first: int) -> FloatArray:
-        """Times [s] from a moment on: small numbers keep all digits."""
+        """Return times [s] relative to a moment: small numbers keep all digits."""
         return np.array([time - first for time in self.nanoseconds], dtype=np.int64) / 1e9
 
 
 class EurocSequence(RecordedSequence):
     """A sequence in the layout of the EuRoC MAV data set; see `datasets.base.Sequence`.
 
-    Stereo pairs are rectified as the settings say: with ``LEFT.*`` and ``RIGHT.*`` of a settings
-    file, with the built-in ``euroc``, or by the cameras' ``sensor.yaml``.
+    Stereo pairs are rectified by the settings: ``LEFT.*`` and ``RIGHT.*`` of a settings file, the
+    built-in ``euroc``, or the cameras' ``sensor.yaml``.
 
     Parameters
     ----------
     folder
         The folder of the sequence or its ``mav0``.
     sensor
-        Monocular (``cam0`` as it is) or stereo; by default stereo if there is ``cam1``.
+        Monocular (``cam0`` unrectified) or stereo; by default stereo if there is ``cam1``.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
 
     Raises
     ------
     DatasetError
-        Naming the file, and the line if a list is malformed.
+        The message names the file, and the line if a list is malformed.
     SettingsError
-        If the settings are wrong, or lack the rectification for stereo.
+        If the settings are invalid, or have no rectification for stereo.
     """
 
     layout = Layout.EUROC
@@ -149,8 +149,8 @@ class EurocSequence(RecordedSequence):
     def ground_truth(self) -> Trajectory | None:
         """Read the body's poses and move them to the left camera, rectified if it is.
 
-        See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing
-        or has no ``T_BS``: the camera's place on the vehicle is unknown then.
+        See `datasets.base.Sequence.ground_truth`. None also if ``cam0/sensor.yaml`` is missing or
+        has no ``T_BS``, because the pose of the camera on the vehicle is then unknown.
         """
         path = self._root / "state_groundtruth_estimate0" / "data.csv"
         if not path.is_file():
@@ -224,14 +224,14 @@ class EurocSequence(RecordedSequence):
 
 
 def has_camera(root: Path, camera: str) -> bool:
-    """Whether a camera has images."""
+    """Return whether a camera has images."""
     return (root / camera / "data").is_dir()
 
 
 def _pair(
     root: Path, left: _CameraList, right: _CameraList
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], list[str]]:
-    """Pair images by the nearest time, at most half a step apart, and say what is odd of it."""
+    """Pair images by the nearest time, at most half a step apart, and report doubts."""
     first = left.nanoseconds[0] if left.nanoseconds else 0
     times, others = left.since(first), right.since(first)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 2 * MAX_DIFFERENCE
@@ -285,7 +285,7 @@ def _guess_path(camera: Path, stamp: str) -> Path:
 
 
 def _list_folder(folder: Path, rate: float) -> _CameraList:
-    """Images named by their time stamps, or counted, for copies without ``data.csv``."""
+    """Return images of copies without ``data.csv``: their names are time stamps or numbers."""
     if not folder.is_dir():
         raise DatasetError(f"cannot open {folder}: no such folder")
     found = sorted(

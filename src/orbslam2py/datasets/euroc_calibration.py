@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""EuRoC's ``sensor.yaml`` of a camera, and the settings that follow from one or two of them."""
+"""EuRoC's ``sensor.yaml`` of a camera, and settings from one or two of these files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, po
 
 @dataclass(frozen=True, eq=False)
 class SensorCalibration:
-    """What ``sensor.yaml`` tells about a camera.
+    """The contents of ``sensor.yaml`` of a camera.
 
     Attributes
     ----------
@@ -39,13 +39,13 @@ class SensorCalibration:
     intrinsics
         fx, fy, cx, cy in pixels, (4,).
     distortion
-        k1, k2, p1, p2, (4,); of a fisheye k1, k2, k3, k4.
+        k1, k2, p1, p2, (4,); for a fisheye k1, k2, k3, k4.
     size
         Width and height in pixels.
     rate
         Images per second.
     is_fisheye
-        Whether the lens is equidistant (Kannala-Brandt), as TUM-VI's.
+        Whether the lens is equidistant (Kannala-Brandt), as in TUM-VI.
     """
 
     path: Path
@@ -63,7 +63,7 @@ class SensorCalibration:
         Raises
         ------
         DatasetError
-            If the file does not tell it.
+            If the file does not contain it.
         """
         if self.T_body_camera is None:
             raise DatasetError(
@@ -90,13 +90,13 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
     Returns
     -------
     SensorCalibration
-        With 20 images per second if the file does not tell its rate, and without `T_body_camera` if
-        it has no ``T_BS``, which a single camera does not need.
+        Without a rate in the file, 20 images per second are assumed. Without ``T_BS``, which a
+        single camera does not need, `T_body_camera` is None.
 
     Raises
     ------
     DatasetError
-        Naming the file, the line and the key.
+        The message names the file, the line and the key.
     """
     try:
         document = scan(path.read_text(encoding="utf-8", errors="replace"))

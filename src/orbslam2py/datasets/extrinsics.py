@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a camera sits on the body whose poses are known."""
+"""The pose of a camera on the body of the ground truth."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def read_extrinsics(path: Path) -> FloatArray:
     Raises
     ------
     DatasetError
-        If the file cannot be read or holds no rigid transform.
+        If the file cannot be read or contains no rigid transform.
     """
     T = _from_yaml(path) if path.suffix.lower() in (".yaml", ".yml") else _from_numbers(path)
     R = T[:3, :3]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sequences in a ``for`` loop: a frame after the other, with its time stamp."""
+"""Sequences in a ``for`` loop: frames in order, with their time stamps."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class FramesInOrder:
         Raises
         ------
         DatasetError, ImageError
-            As from `Sequence.load`; the loop ends with it.
+            From `Sequence.load`; an error ends the loop.
         """
         imu, before = ImuOfFrames(self), None
         for index, timestamp in enumerate(self.timestamps.tolist()):

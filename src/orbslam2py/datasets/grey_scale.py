@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of 16 bits in a sequence: distinguished from depth, and scaled by one range."""
+"""Images of 16 bits in a sequence: distinguished from depth, and scaled by a common range."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _MANY_ZEROS = 0.05
 
 
 class GreyScale:
-    """Makes 8 bits of the images of 16 bits of one sequence, all by the same range.
+    """Scales the images of 16 bits of one sequence to 8 bits, all by the same range.
 
-    The range is chosen when the first of them comes, from images spread over the sequence. A
-    note says it once. May be used by several threads.
+    The range is chosen at the first of them, from images distributed over the sequence. One note
+    reports it. May be called from several threads.
 
     Parameters
     ----------
     what
         The sequence, for messages.
     sample
-        Reads some images, spread over the sequence.
+        Reads some images, distributed over the sequence.
     """
 
     def __init__(self, what: object, sample: Callable[[], Iterable[NDArray[np.generic]]]) -> None:
@@ -43,7 +43,7 @@ class GreyScale:
         self._lock = threading.Lock()
 
     def __call__(self, image: NDArray[np.generic], what: object = None) -> ByteArray:
-        """Scale an image of uint16 to uint8; `what` is its file, which is not looked at."""
+        """Scale an image of uint16 to uint8; `what` is its file, which is not read."""
         with self._lock:
             if self._range is None:
                 self._range = self._choose(image)
@@ -68,13 +68,13 @@ class GreyScale:
 
 
 def spread_over(n: int) -> list[int]:
-    """Places of the sample in a sequence of `n` images, ascending."""
+    """Numbers of the sample in a sequence of `n` images, ascending."""
     places = np.linspace(0, n - 1, min(n, N_SAMPLE))
     return [int(place) for place in np.unique(places.round())]
 
 
 def read_sample(files: Iterable[Path]) -> list[NDArray[np.generic]]:
-    """Read images as they are; those that cannot be read are left out."""
+    """Read images unchanged; unreadable ones are left out."""
     found = []
     for path in files:
         try:
@@ -85,16 +85,16 @@ def read_sample(files: Iterable[Path]) -> list[NDArray[np.generic]]:
 
 
 def refuse_depth(path: Path, image: NDArray[np.generic], *, with_depth: bool) -> None:
-    """Raise `ImageError` if an image for eyes is a depth image.
+    """Raise `ImageError` if an image that should be grey or colour is a depth image.
 
     Parameters
     ----------
     path
-        Its file, whose name or folder may say so.
+        Its file, whose name or folder may say depth.
     image
-        The image as it was read.
+        The image as read.
     with_depth
-        Whether it has a depth image of its own: then 16 bits in one channel are never grey.
+        Whether there is a separate depth image: then 16 bits in one channel are never grey.
     """
     if image.dtype != np.uint16 or (image.ndim == 3 and image.shape[2] > 1):
         return
@@ -111,7 +111,7 @@ def refuse_depth(path: Path, image: NDArray[np.generic], *, with_depth: bool) ->
 
 
 def refuse_first_depth(path: Path, *, with_depth: bool) -> None:
-    """Look at the first image of a sequence; see `refuse_depth`.
+    """Check the first image of a sequence; see `refuse_depth`.
 
     Raises
     ------

@@ -74,26 +74,26 @@ class ImageFolder(FramesInOrder, UnposedSource):
     Parameters
     ----------
     folder
-        Where the images are; its subfolders are not looked at.
+        The folder of the images, without its subfolders.
     sensor
-        Monocular; if images are split also stereo, the default then.
+        Monocular; with split images also stereo, which is then the default.
     settings
         Settings, a file, a built-in name, or None for ``settings.yaml`` in the folder.
     fps
-        Images per second; by default the names if all are times (``1357847239208312.tiff``), else
-        that of the settings.
+        Images per second; by default the times in the names, if all are times
+        (``1357847239208312.tiff``), else the rate of the settings.
     times
         File with one time stamp per image, in the order of the images; or a list of images with
         their time stamps, such as ``rgb.txt`` of TUM RGB-D.
     split
-        Whether every image holds the left view in its left half, the right view in its right half.
+        Whether the left and right half of every image are the left and right view.
 
     Raises
     ------
     DatasetError
         If there are no images, or the time stamps do not fit them.
     SettingsError
-        If there are no settings, or they are wrong.
+        If there are no settings, or they are invalid.
     """
 
     layout = "images"
@@ -154,7 +154,7 @@ class ImageFolder(FramesInOrder, UnposedSource):
         return self._stamps.texts[index_of(index, len(self))]
 
     def default_settings(self) -> Settings:
-        """Return the settings: an image folder has no others."""
+        """Return the settings; an image folder has none of its own."""
         return self.settings
 
     def image_path(self, index: int, /) -> Path:

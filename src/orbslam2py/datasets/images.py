@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Image files to arrays, with errors that name the file."""
+"""Reading of image files to arrays, with errors that name the file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PIXELS = 1 << 15
 
 
 class _Silence:
-    """Who wants OpenCV's log silent, and the level it had before the first of them."""
+    """The number of users that silence OpenCV's log, and its level before."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()
@@ -40,10 +40,9 @@ _silence = _Silence()
 
 @contextlib.contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Keep OpenCV from printing warnings: what goes wrong is said by an exception.
+    """Silence OpenCV's warnings: errors are reported by exceptions.
 
-    The log is that of the whole process: of threads that overlap, the last one gives it its level
-    back.
+    The log belongs to the whole process: of overlapping threads, the last one restores its level.
     """
     logging: Any = getattr(cv2.utils, "logging", cv2)  # cv2 4 has its functions itself
     with _silence.lock:
@@ -61,7 +60,7 @@ def quiet_opencv() -> Iterator[None]:
 
 
 def open_video(path: Path, error: type[OrbSlamError] = DatasetError) -> cv2.VideoCapture:
-    """Open a video, quietly; whether that has worked is asked of what is returned.
+    """Open a video without warnings; the result says whether it worked.
 
     Parameters
     ----------
@@ -89,9 +88,9 @@ def read_image(path: Path, *, rgb: bool, to_8_bits: To8Bits | None = None) -> By
     path
         An image file of any format OpenCV reads.
     rgb
-        Whether colour is wanted in the order RGB (True) or BGR.
+        Whether the order of colours is RGB (True) or BGR.
     to_8_bits
-        What is done with 16 bits per channel; None if they are refused.
+        Scaling of 16 bits per channel; None if they are refused.
 
     Returns
     -------
@@ -124,8 +123,8 @@ def read_image(path: Path, *, rgb: bool, to_8_bits: To8Bits | None = None) -> By
 def _swap_red_and_blue(image: ByteArray) -> ByteArray:
     """BGR to RGB, with alpha or without.
 
-    Some rows at a time, few enough that OpenCV does them in this thread: those of its pool wait
-    busily for more work, which costs the threads that track more than it saves here.
+    Convert few rows at a time, so that OpenCV works in this thread: waiting threads of its pool
+    would delay the tracking threads more than they help.
     """
     code = cv2.COLOR_BGR2RGB if image.shape[2] == 3 else cv2.COLOR_BGRA2RGBA
     swapped = np.empty_like(image)
@@ -137,7 +136,7 @@ def _swap_red_and_blue(image: ByteArray) -> ByteArray:
 
 
 def read_depth(path: Path) -> NDArray[np.generic]:
-    """Read a depth image unchanged, single channel (h, w), uint16 as a rule.
+    """Read a depth image unchanged, single channel (h, w), usually uint16.
 
     Raises
     ------
@@ -162,7 +161,7 @@ def read_any(path: Path) -> NDArray[np.generic]:
     DatasetError
         If there is no such file.
     ImageError
-        If it is no complete image, or no file at all: pipes and devices are not opened.
+        If it is no complete image, or no file: pipes and devices are not opened.
     """
     try:
         _check_regular(path)
@@ -175,14 +174,14 @@ def read_any(path: Path) -> NDArray[np.generic]:
 
 
 def _check_regular(path: Path) -> None:
-    """Raise `ImageError` if a path is no file or folder: to open a pipe is to wait for a writer."""
+    """Raise `ImageError` if a path is no file or folder: opening a pipe would wait for a writer."""
     kind = kind_of_special(path)
     if kind is not None:
         raise ImageError(f"image {path} is a {kind}, not a file; replace it, or leave it out")
 
 
 def decode_any(content: bytes, what: object) -> NDArray[np.generic]:
-    """Decode the content of an image file of any depth and number of channels as it is.
+    """Decode the content of an image file of any depth and number of channels, unchanged.
 
     Parameters
     ----------

@@ -46,25 +46,26 @@ _USUAL_RATE = 10.0
 class KittiSequence(RecordedSequence):
     """A sequence in the layout of KITTI odometry; see `datasets.base.Sequence`.
 
-    The grey cameras ``image_0`` and ``image_1`` are taken if they are there, else the colour
-    cameras ``image_2`` and ``image_3``, with their own calibration.
+    The grey cameras ``image_0`` and ``image_1`` are used if they exist, else the colour cameras
+    ``image_2`` and ``image_3``, with their own calibration.
 
     Parameters
     ----------
     folder
         The folder with ``times.txt`` and ``image_0`` or ``image_2``.
     sensor
-        Monocular (left camera) or stereo; by default stereo if both cameras of a pair are there.
+        Monocular (left camera) or stereo; by default stereo if there are images of both cameras.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
 
     Raises
     ------
     DatasetError
-        Naming the file, and the line if a list is malformed; also if there are images without a
-        time. Times without images, as where only a part of the images was copied, are warned of.
+        The message names the file, and the line if a list is malformed; also if there are images
+        without a time. Times without images give a warning, because a part of the images may have
+        been copied.
     SettingsError
-        If the settings are wrong.
+        If the settings are invalid.
     """
 
     layout = Layout.KITTI
@@ -108,9 +109,9 @@ class KittiSequence(RecordedSequence):
     def ground_truth(self) -> Trajectory | None:
         """Read ``poses.txt``, ``NN.txt`` or ``../../poses/NN.txt``.
 
-        See `datasets.base.Sequence.ground_truth`. Poses belong to frames by their number; the
-        files of the benchmark may hold more of them than a shortened sequence has frames. They are
-        those of the left grey camera; ``calib.txt`` tells how far beside it the colour one is.
+        See `datasets.base.Sequence.ground_truth`. Poses belong to frames by their number; a
+        shortened sequence may have fewer frames than poses. They are those of the left grey camera;
+        ``calib.txt`` contains the distance to the colour camera.
         """
         path = self._ground_truth_path()
         if path is None:
@@ -201,7 +202,7 @@ class KittiSequence(RecordedSequence):
             raise DatasetError(f"{path}: {error}") from error
 
     def _built_in(self) -> str:
-        """Name the built-in settings that fit the first image or the number, all if none does."""
+        """Return the built-in settings that fit the first image or the number; all if none does."""
         try:
             height, width = read_image(self.image_path(0), rgb=True).shape[:2]
         except (DatasetError, ImageError):
@@ -222,7 +223,7 @@ def find_cameras(folder: Path) -> tuple[int, ...]:
 
 
 def _choose_cameras(folder: Path, sensor: Sensor | None) -> tuple[int, int, bool]:
-    """Choose the left and the right camera, and tell whether there are images of the right one."""
+    """Choose the left and the right camera; return whether the right one has images."""
     there = [pair for pair in _PAIRS if pair[0] in find_cameras(folder)] or list(_PAIRS[:1])
     whole = [pair for pair in there if (folder / f"image_{pair[1]}").is_dir()]
     left, right = there[0] if sensor is Sensor.MONOCULAR or not whole else whole[0]
@@ -243,7 +244,7 @@ def _read_times(path: Path, fps: float | None) -> Stamps:
 
 
 def _numbers_of_a_piece(times: Path, n: int, folders: list[Path]) -> list[int] | None:
-    """Numbers of the images of a piece of a sequence, as many as times; None if it begins at 0."""
+    """Return the numbers of the images if a sequence does not begin at 0; None if it does."""
     found = [_numbers_of_images(folder) for folder in folders]
     numbers = found[0]
     if len(numbers) != n or not numbers or numbers[0] == 0 or any(f != numbers for f in found):
@@ -258,10 +259,10 @@ def _numbers_of_a_piece(times: Path, n: int, folders: list[Path]) -> list[int] |
 def _check_number_of_times(times: Path, n: int, folders: list[Path]) -> None:
     """Refuse images without a time, and warn of times without images.
 
-    Images belong to times by their number. Those beyond the last time would be left out, and a list
-    that is too short may well be that of another sequence. The other way round, the images that are
-    there have their times, as where only the first ones were copied; the others are skipped like
-    any image that is missing, which is said here once for all of them.
+    Images belong to times by their number. Images beyond the last time would be left out, and a
+    short list may belong to another sequence. Times without images are harmless, for example if
+    only the first images were copied. They are skipped like any missing image, with one warning for
+    all.
     """
     found = [(numbers, folder) for folder in folders if (numbers := _numbers_of_images(folder))]
     for numbers, folder in found:
@@ -282,7 +283,7 @@ def _check_number_of_times(times: Path, n: int, folders: list[Path]) -> None:
 
 
 def _numbers_of_images(folder: Path) -> list[int]:
-    """Numbers of the frames that a folder has an image of, ascending."""
+    """Return the numbers of the frames with an image in a folder, ascending."""
     if not folder.is_dir():
         return []
     stems = {path.stem for path in folder.iterdir() if path.suffix in (".png", ".jpg")}

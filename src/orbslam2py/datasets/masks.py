@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Masks: where in the images keypoints may lie."""
+"""Masks: the regions of images that may have keypoints."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class StaticMask:
     Parameters
     ----------
     path
-        An image file with one channel of 8 bits: 0 where no keypoint may lie.
+        An image file with one channel of 8 bits: no keypoints where it is 0.
 
     Raises
     ------
@@ -48,14 +48,14 @@ class StaticMask:
         Parameters
         ----------
         index
-            Not looked at: the mask is the same for all.
+            Not used: the mask is the same for all.
         image
             The image the mask is for, uint8 (h, w) or (h, w, channels).
 
         Returns
         -------
         ByteArray
-            (h, w), 0 where no keypoint may lie.
+            (h, w), no keypoints where it is 0.
 
         Raises
         ------
@@ -68,8 +68,8 @@ class StaticMask:
 class MaskFolder:
     """One mask per image.
 
-    If every image's file has a mask of the same name (apart from the ending), the names count.
-    Otherwise there must be as many masks as images, and they belong together by their order.
+    If the file of every image has a mask of the same name (apart from the suffix), masks are
+    assigned by names. Otherwise there must be as many masks as images, in the same order.
 
     Parameters
     ----------
@@ -112,14 +112,14 @@ class MaskFolder:
         Parameters
         ----------
         index
-            Place of the frame in the sequence, from 0.
+            Number of the frame in the sequence, from 0.
         image
             The image the mask is for, uint8 (h, w) or (h, w, channels).
 
         Returns
         -------
         ByteArray
-            (h, w), 0 where no keypoint may lie.
+            (h, w), no keypoints where it is 0.
 
         Raises
         ------
@@ -130,9 +130,9 @@ class MaskFolder:
 
 
 def read_mask(path: Path) -> ByteArray:
-    """Read a mask: uint8 (h, w), 0 where no keypoint may lie.
+    """Read a mask: uint8 (h, w), no keypoints where it is 0.
 
-    Images with several equal channels are taken as well.
+    Images with several equal channels are allowed too.
 
     Raises
     ------
@@ -172,7 +172,7 @@ _OF_LIVE = frozenset(
 
 
 class _Masked:
-    """What masked sources share: everything but the images comes from the source."""
+    """Common parts of masked sources: all but the masks comes from the source."""
 
     def __init__(self, source: Sequence | LiveSource, masks: StaticMask | MaskFolder) -> None:
         self._inner = source
@@ -185,12 +185,12 @@ class _Masked:
 
     @property
     def layout(self) -> str:
-        """How it lies on disk, or ``camera``."""
+        """Layout on disk, or ``camera``."""
         return self._inner.layout
 
     @property
     def sensor(self) -> Sensor:
-        """What it delivers images for."""
+        """The sensor."""
         return self._inner.sensor
 
     @property
@@ -200,7 +200,7 @@ class _Masked:
 
     @property
     def up_in_truth(self) -> FloatArray | None:
-        """Direction of up in the world of the ground truth, (3,); None if it is not known."""
+        """Up direction in the world of the ground truth, (3,); None if it is not known."""
         return getattr(self._inner, "up_in_truth", None)
 
     def ground_truth(self) -> Trajectory | None:
@@ -217,10 +217,10 @@ class MaskedSequence(FramesInOrder, _Masked):
     Parameters
     ----------
     sequence
-        The images. For a pair the masks belong to the left ones, as `load` delivers them
+        The images. For a pair the masks belong to the left images as `load` returns them
         (rectified).
     masks
-        A file, or a folder with one per image.
+        A file, or a folder with one file for each image.
 
     Raises
     ------
@@ -256,7 +256,7 @@ class MaskedSequence(FramesInOrder, _Masked):
 
     @property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds, float64 (n,); as of the sequence."""
+        """Time of every frame in seconds, float64 (n,); from the sequence."""
         return self._sequence.timestamps
 
     def timestamp_text(self, index: int, /) -> str:
@@ -264,7 +264,7 @@ class MaskedSequence(FramesInOrder, _Masked):
         return self._sequence.timestamp_text(index)
 
     def default_settings(self) -> Settings:
-        """Choose settings by what comes with the images; see `datasets.base.Sequence`."""
+        """Choose settings by the files beside the images; see `datasets.base.Sequence`."""
         return self._sequence.default_settings()
 
     def load(self, index: int, /) -> Images:

@@ -24,15 +24,15 @@ _OTHERS = 0.5
 
 
 def side_of_pair(left: str, right: str) -> int | None:
-    """Tell whether two names are those of the left and the right camera of a pair.
+    """Return whether two names are those of the left and the right camera of a pair.
 
-    They are if they differ in nothing but one word or number, which is ``left`` and ``right``,
-    ``l`` and ``r``, 0 and 1, 1 and 2, or 2 and 3: ``/infra1/image`` and ``/infra2/image``.
+    Such names differ only in one word or number: ``left`` and ``right``, ``l`` and ``r``, 0 and 1,
+    1 and 2, or 2 and 3, as in ``/infra1/image`` and ``/infra2/image``.
 
     Returns
     -------
     int or None
-        Which of these it is, the clearest first; None if they are no such names.
+        Rank of the pair of words, the clearest first; None if they are no such names.
     """
     ours, theirs = _TOKEN.findall(left), _TOKEN.findall(right)
     if len(ours) != len(theirs):
@@ -42,7 +42,7 @@ def side_of_pair(left: str, right: str) -> int | None:
 
 
 def tells_camera(name: str, side: int) -> bool:
-    """Tell whether the word or number of a side is that of a camera: not in ``run1``, ``run2``."""
+    """Return whether the word or number belongs to a camera: not in ``run1``, ``run2``."""
     return not _SIDES[side][0].isdecimal() or _CAMERA.search(name) is not None
 
 
@@ -53,11 +53,11 @@ class Series:
     Attributes
     ----------
     left, right
-        The files by what is left of their names without the word for the side.
+        The files by their names without the word for the side.
     sides
         These words.
     n_others
-        Files that are in neither.
+        Files that belong to neither side.
     """
 
     left: dict[str, Path]
@@ -67,7 +67,7 @@ class Series:
 
     @property
     def common(self) -> list[str]:
-        """Names, without the side, that both have; in the order of the left ones."""
+        """Return the names without the side that both have; in the order of the left ones."""
         return [name for name in self.left if name in self.right]
 
 
@@ -82,7 +82,7 @@ def find_series(files: Sequence[Path]) -> Series | None:
     Returns
     -------
     Series or None
-        None if there are no two series, or if they are the lesser part of the files.
+        None if there are no two series, or if they are less than half of the files.
     """
     by_word: dict[str, dict[str, Path]] = {}
     for path in files:
@@ -100,7 +100,7 @@ def find_series(files: Sequence[Path]) -> Series | None:
 
 
 def _without_side(stem: str) -> list[tuple[str, str]]:
-    """Words for a side in a name, each with the rest of the name."""
+    """Return the words for a side in a name, each with the rest of the name."""
     tokens = _TOKEN.findall(stem)
     found = []
     for k, token in enumerate(tokens):
@@ -115,7 +115,7 @@ def _without_side(stem: str) -> list[tuple[str, str]]:
 
 
 def _plain(token: str) -> str:
-    """A word in small letters, a number without zeros before it: ``image_02`` is camera 2."""
+    """A word in lower case, a number without leading zeros: ``image_02`` is camera 2."""
     return token.lstrip("0") or "0" if token.isdecimal() and len(token) <= 2 else token.lower()
 
 

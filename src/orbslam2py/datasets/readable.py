@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The layouts of images that are read, with an example of each: the documentation is made of it."""
+"""The layouts of images that can be read, with examples; the documentation is generated from it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class ReadableLayout:
     name
         What it is called.
     sensors
-        What it can hold images for.
+        Sensors that it can have images for.
     description
-        How it is recognised, and what is special about it.
+        How it is recognised, and its special features.
     example
-        Files or lines of it.
+        Example of its files or lines.
     layouts
         Names of these layouts in reports.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kind of sequence a folder holds, recognised by its files."""
+"""The layout of a folder, recognised by its files."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MARKS = (
 
 
 def recognise(folder: str | Path) -> Layout | str:
-    """Tell the layout of a recorded sequence by the files in its folder.
+    """Return the layout of a recorded sequence by the files in its folder.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def recognise(folder: str | Path) -> Layout | str:
 
 
 def has_layout(folder: Path) -> bool:
-    """Tell whether a folder has the files of a layout."""
+    """Return whether a folder has no layout, but a folder of images and a folder of depth."""
     return folder.is_dir() and bool(_layouts(folder))
 
 
@@ -86,7 +86,7 @@ def is_depth_pair(folder: Path, sensor: Sensor | str | None) -> bool:
     Raises
     ------
     DatasetError
-        If RGB-D is wanted, or there is depth, and it is not certain which folders are meant.
+        If RGB-D is requested, or there is depth, and the choice of folders is not clear.
     """
     if not folder.is_dir() or has_layout(folder):
         return False
@@ -108,14 +108,14 @@ def open_folders(
     fps: float | None = None,
     times: str | Path | None = None,
 ) -> IterableSequence | None:
-    """Open images without any list: with depth, or of a pair; None if there are none of these.
+    """Open images without a list, with depth or of a pair; None if there are no such images.
 
     Raises
     ------
     DatasetError
-        If RGB-D or stereo is wanted, or there is depth, and it is not certain which are meant.
+        If RGB-D or stereo is requested, or there is depth, and the choice is not clear.
     SettingsError
-        If there are no settings, or they are wrong.
+        If there are no settings, or they are invalid.
     """
     if not folder.is_dir() or has_layout(folder):
         return None
@@ -145,32 +145,32 @@ def open_sequence(
     Parameters
     ----------
     folder
-        TUM RGB-D, KITTI odometry or a drive of KITTI raw, EuRoC (the sequence or its ``mav0``),
-        ICL-NUIM, 7-Scenes, Bonn, Replica or OpenLORIS, what a loader of another package recognises,
-        a folder with a folder of images and a folder of depth images, a folder with images of a
-        left and a right camera (two folders or two series), or a bag of ROS 1 or ROS 2 (a file, or
-        the folder of a recording).
+        One of: TUM RGB-D, KITTI odometry or a drive of KITTI raw, EuRoC (the sequence or its
+        ``mav0``), ICL-NUIM, 7-Scenes, Bonn, Replica or OpenLORIS; a layout of another package; a
+        folder with images and depth in two folders; a folder with images of a left and a right
+        camera (two folders or two series); a bag of ROS 1 or ROS 2 (a file, or the folder of a
+        recording).
     sensor
-        What to deliver images for; by default the richest the folder has images for.
+        The sensor; by default the richest one that the folder has images for.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide when they are needed.
+        Settings, a file, a built-in name, or None to choose by the folder when they are needed.
     association
         Association file of a TUM sequence; by default one in the folder, else by time stamps.
     layout
-        How to read the folder, if it should not be recognised; also the name of an entry point.
+        The layout, if it should not be recognised; also the name of an entry point.
     topics
-        Of a bag: which topics are the images, as `datasets.BagSequence` takes them.
+        For a bag: the topics of the images, as `datasets.BagSequence` takes them.
 
     Returns
     -------
     IterableSequence
-        A `RecordedSequence`, a `BagSequence`, or what a loader of another package makes; images
-        are read when asked for.
+        A `RecordedSequence`, a `BagSequence`, or the sequence of another package's loader; images
+        are read on request.
 
     Raises
     ------
     DatasetError
-        If the folder is no sequence, its lists are malformed or it has no images for the sensor.
+        If the folder is no sequence, its lists are malformed, or it has no images for the sensor.
     SettingsError
         If the settings given are wrong.
     """
@@ -201,7 +201,7 @@ def open_sequence(
 
 
 def is_recording(path: Path) -> bool:
-    """Tell whether a path is a bag, and no folder of images with a bag beside them."""
+    """Return whether a path is a bag, and no folder of images beside a bag."""
     return is_bag(path) and not (path.is_dir() and (_layouts(path) or image_files(path)))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the sequences on disk have in common."""
+"""Common parts of sequences on disk."""
 
 from __future__ import annotations
 
@@ -53,18 +53,18 @@ class RecordedSequence(FramesInOrder, ABC):
     folder
         Where the images are.
     available
-        Sensors there are images for, the richest first.
+        Sensors that there are images for, the richest first.
     sensor
-        One of them; by default the first.
+        One of these sensors; by default the first.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
 
     Raises
     ------
     DatasetError
         If there are no images for the sensor.
     SettingsError
-        If the settings are wrong.
+        If the settings are invalid.
     """
 
     layout: str
@@ -97,7 +97,7 @@ class RecordedSequence(FramesInOrder, ABC):
         return with_rectified_images(chosen)
 
     def default_settings(self) -> Settings:
-        """Choose by what is in the folder; see `choose_settings`."""
+        """Choose by the files in the folder; see `choose_settings`."""
         return self._default_settings
 
     @cached_property
@@ -109,11 +109,11 @@ class RecordedSequence(FramesInOrder, ABC):
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What was changed in the time stamps, or may be wrong: sentences that were logged."""
+        """Changes of the time stamps, and doubts: sentences that were logged."""
         return self._stamps.doubts
 
     def known_rate(self) -> float | None:
-        """Images per second of the settings; None if nothing tells them."""
+        """Images per second of the settings; None if there are none."""
         try:
             return self.settings.camera.fps
         except (SettingsError, DatasetError):
@@ -132,12 +132,12 @@ class RecordedSequence(FramesInOrder, ABC):
         return self._stamps.texts[index_of(index, len(self))]
 
     def require_images(self) -> None:
-        """See that at least one of the first frames has its images, and that they are no depth.
+        """Check that at least one of the first frames has its images, and that they are no depth.
 
         Raises
         ------
         DatasetError
-            If none has, so that no run skips a thousand frames one after the other.
+            If none has them; otherwise a run would skip a thousand frames one by one.
         """
         if len(self):
             refuse_first_depth(self._files(0)[0], with_depth=self.sensor is Sensor.RGBD)
@@ -172,7 +172,7 @@ class RecordedSequence(FramesInOrder, ABC):
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
 
     def imu(self) -> ImuSamples | None:
-        """Read the samples of the IMU, each time anew; nothing is read before.
+        """Read the samples of the IMU at each call; nothing is read before.
 
         By default those of ``imu.csv`` in the folder; see `read_imu_csv`.
 
@@ -184,13 +184,13 @@ class RecordedSequence(FramesInOrder, ABC):
         Raises
         ------
         DatasetError
-            Naming the file and the line that is wrong.
+            The message names the file and the line.
         """
         path = self._beside("imu.csv")
         return None if path is None else read_imu_csv(path)
 
     def imu_settings(self) -> ImuSettings | None:
-        """Read what comes with the recording about its IMU; None if nothing does.
+        """Read the IMU settings of the recording; None if there are none.
 
         By default ``imu.yaml`` in the folder, with the keys of ORB-SLAM3; see `read_imu_settings`.
 
@@ -199,13 +199,13 @@ class RecordedSequence(FramesInOrder, ABC):
         Raises
         ------
         SettingsError
-            Naming the file and the key that is wrong.
+            The message names the file and the key.
         """
         path = self._beside("imu.yaml")
         return None if path is None else read_imu_settings(path)
 
     def _beside(self, name: str) -> Path | None:
-        """A file in the folders where settings are looked for."""
+        """Return a file in the folders that may contain settings."""
         paths = (folder / name for folder in self._settings_folders())
         return next((path for path in paths if path.is_file()), None)
 
@@ -222,7 +222,7 @@ class RecordedSequence(FramesInOrder, ABC):
         return self._grey_scale(image)
 
     def _sample(self) -> list[NDArray[np.generic]]:
-        """Images of the (left) camera, spread over the sequence."""
+        """Return images of the (left) camera, distributed over the sequence."""
         return read_sample(self._files(index)[0] for index in spread_over(len(self)))
 
     def _settings_folders(self) -> tuple[Path, ...]:
@@ -233,7 +233,7 @@ class RecordedSequence(FramesInOrder, ABC):
 
 
 def _found_instead(folder: Path, missing: Path) -> str:
-    """Say what the image's folder holds instead, or, if there is none, where the image is."""
+    """Return what the folder contains instead, or else where the image is."""
     if missing.parent.is_dir():
         names = [p.name for p in missing.parent.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
         return f" (there is {missing.parent / min(names)})" if names else ""

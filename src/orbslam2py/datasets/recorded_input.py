@@ -55,18 +55,18 @@ def open_recorded(
         folder of images and one of depth, or with images of a left and a right camera (two folders,
         or two series of images), bag of ROS 1 or ROS 2 (file or folder), or video file.
     sensor
-        What to deliver images for; by default the richest there is.
+        The sensor; by default the richest one that there are images for.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
     fps
         Images per second of a folder of images or a video.
     times
-        File with one time stamp per image of a folder of images or a video: decimal seconds or
-        whole nanoseconds, with the images' file names or without.
+        File with one time stamp for each image of a folder or a video: decimal seconds or whole
+        nanoseconds, with or without the names of the images.
     mask
-        An image file, 0 where no keypoint may lie, or a folder with one per image.
+        An image file, with no keypoints where it is 0, or a folder with one for each image.
     topics
-        Of a bag: which topics are the images, as `BagSequence` takes them.
+        For a bag: the topics of the images, as `BagSequence` takes them.
     split
         Of a folder of images or a video: whether every image holds the left view in its left half
         and the right view in its right half.
@@ -74,9 +74,9 @@ def open_recorded(
     Raises
     ------
     DatasetError
-        If there is nothing of that name, or it has no images for the sensor.
+        If there is no such input, or it has no images for the sensor.
     SettingsError
-        If there are no settings, or they are wrong.
+        If there are no settings, or they are invalid.
     ImageError
         If the mask is no readable image.
     """
@@ -154,7 +154,7 @@ def refuse_topics(source: object, topics: Mapping[str, str] | str | None) -> Non
 
 
 def _require_video(path: Path) -> None:
-    """Say what a file is that cannot be a video by its name; what has no known name is tried."""
+    """Refuse a file if its name says that it is no video."""
     ending = path.suffix.lower()
     for endings, what, option in _OTHER_FILES:
         if ending in endings:
@@ -174,7 +174,7 @@ def _require_video(path: Path) -> None:
 
 
 def _refuse_half_of_pair(path: Path, sensor: Sensor | str | None) -> None:
-    """Name the folder above if one of the two folders of a pair is given for RGB-D or stereo."""
+    """Name the parent folder if the user gives only one of the two folders."""
     wanted = None if sensor is None else Sensor(sensor)
     here, above = path.resolve(), path.resolve().parent
     if wanted in (None, Sensor.MONOCULAR) or has_layout(above):

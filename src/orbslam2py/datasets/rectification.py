@@ -47,7 +47,7 @@ class Rectifier:
         Raises
         ------
         ImageError
-            If the size is not the one of the calibration.
+            If the size is not that of the calibration.
         """
         if image.shape[:2] != self._size:
             height, width = self._size
@@ -63,7 +63,7 @@ Rectifiers = tuple[Rectifier, Rectifier]
 
 
 def rectifiers_of(settings: Settings) -> Rectifiers | None:
-    """Make what rectifies the images of a pair; None if its images are rectified already."""
+    """Make the rectification of a pair; None if its images are already rectified."""
     pair = settings.rectification
     return None if pair is None else (Rectifier(pair.left), Rectifier(pair.right))
 

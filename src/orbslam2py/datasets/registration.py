@@ -30,7 +30,7 @@ _STEPS = 30
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """How a camera maps rays to the pixels of its images.
+    """The map from rays to the pixels of a camera.
 
     Attributes
     ----------
@@ -50,9 +50,9 @@ class Lens:
 class DepthRegistration:
     """Registers images of a depth camera to a colour camera beside it.
 
-    Each pixel of depth is a small square, which is seen from the colour camera: it covers all
-    pixels whose centres lie in it, so that a finer colour image gets no holes. Of several depths
-    at one pixel the nearest one stays.
+    Each pixel of depth is a small square in front of the colour camera: it covers all pixels whose
+    centres it contains, so that a finer colour image has no holes. Of several depths at one pixel
+    the nearest one is kept.
 
     Parameters
     ----------
@@ -82,23 +82,23 @@ class DepthRegistration:
         self._reach = np.float32(_MARGIN**2 * np.square(corners).sum(axis=0).max())
 
     def register(self, depth: NDArray[np.generic]) -> NDArray[np.float32]:
-        """Find the depth at the pixels of the colour camera.
+        """Compute the depth at the pixels of the colour camera.
 
         Parameters
         ----------
         depth
-            Image (h, w) of the depth camera; 0, NaN and infinity are no depth.
+            Image (h, w) of the depth camera; 0, NaN and infinity mean no depth.
 
         Returns
         -------
         NDArray[np.float32]
-            Depth along the axis of the colour camera, of its size, in the same units; 0 where
-            there is none.
+            Depth along the axis of the colour camera, in its size and the same units; 0 means no
+            depth.
 
         Raises
         ------
         ImageError
-            If the image has another size than the depth camera.
+            If the size is not that of the depth camera.
         """
         width, height = self._depth_size
         if depth.shape != (height, width):
@@ -117,7 +117,7 @@ class DepthRegistration:
     def _draw(
         self, raw: NDArray[np.float32], rays: NDArray[np.float32], drawn: NDArray[np.float32]
     ) -> None:
-        """Move points into the coordinates of the colour camera, and draw their squares."""
+        """Transform points into the coordinates of the colour camera, and draw their squares."""
         known = (raw > 0) & (raw < np.inf)
         if not known.all():
             raw, rays = raw[known], rays[:, known]
@@ -155,7 +155,7 @@ def _centres_in(
 
 
 def _fill_holes(drawn: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Fill single pixels in the middle of a surface, and put 0 where there is no depth."""
+    """Fill single pixels inside a surface, and write 0 where there is no depth."""
     hole = np.isinf(drawn)
     drawn[hole] = 0
     known = (~hole).view(np.uint8)
@@ -174,7 +174,7 @@ def _fill_holes(drawn: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _rays_of(lens: Lens, *, corners: bool = False) -> FloatArray:
-    """Rays (3, n) with z = 1 of all pixels in the order of memory, or of the four corners."""
+    """Return rays (3, n) with z = 1 of all pixels in memory order, or of the corners."""
     width, height = lens.size
     us, vs = ([0, width - 1], [0, height - 1]) if corners else (np.arange(width), np.arange(height))
     u, v = (grid.ravel().astype(np.float64) for grid in np.meshgrid(us, vs))

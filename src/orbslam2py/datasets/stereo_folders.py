@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of a left and a right camera without any list: in two folders, or in one."""
+"""Images of a left and a right camera without a list: in two folders, or in one."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class ImagePair:
     folder
         Where both lie.
     left, right
-        How they are called in messages.
+        Name of the images in messages.
     left_files, right_files
-        The images in their order, by the part of their names that does not tell the side.
+        The images in their order, by the part of their names without the side.
     """
 
     folder: Path
@@ -56,15 +56,15 @@ class ImagePair:
 def find_pair_of_folders(
     kinds: Sequence[FolderKind], *, wanted: bool
 ) -> tuple[FolderKind, FolderKind] | None:
-    """Choose the two folders whose names tell left and right.
+    """Choose the two folders whose names mean left and right.
 
     Parameters
     ----------
     kinds
         Folders with images.
     wanted
-        Whether the user asks for stereo; numbers alone (``0`` and ``1``, ``run1`` and ``run2``) are
-        two cameras only then.
+        Whether the user requests stereo; only then numbers alone (``0`` and ``1``, ``run1`` and
+        ``run2``) mean two cameras.
     """
     usable = [one for one in kinds if one.kind != "other" and not is_depth_name(one.path.name)]
     found = [
@@ -98,7 +98,7 @@ def find_image_pair(folder: Path, *, wanted: bool = False) -> ImagePair | None:
 
 
 def no_pair(folder: Path) -> DatasetError:
-    """Say what a folder has instead of a pair, and what a pair looks like."""
+    """Return a message: the contents of a folder without a pair, and examples of pairs."""
     files = image_files(folder)
     if files:
         return DatasetError(
@@ -113,21 +113,21 @@ class StereoFolders(UnlistedSequence):
     """Images of a pair of cameras, in two folders or in one; see `datasets.base.Sequence`.
 
     The two sides are recognised by their names, which differ in left and right, l and r, 0 and 1, 1
-    and 2, or 2 and 3. Images belong together by equal names, by times if all names are times, by
-    the numbers in their names, or else by their order if there are as many of both.
+    and 2, or 2 and 3. Images are paired by equal names, by times if all names are times, by the
+    numbers in their names, or else by their order if there are as many of both.
 
     Parameters
     ----------
     folder
-        The folder of both folders, or of both series.
+        The folder that contains both folders or both series.
     sensor
-        Stereo or monocular (the left images); by default stereo, or monocular if the settings given
+        Stereo or monocular (the left images); by default stereo, or monocular if the given settings
         are of a single camera.
     settings
         Settings, a file, a built-in name, or None for ``settings.yaml`` in the folder. Images are
-        rectified if they have the calibration of the raw cameras.
+        rectified if the settings have the calibration of the raw cameras.
     fps
-        Images per second; by default the names if they are times, else the rate of the settings.
+        Images per second; by default the times in the names, else the rate of the settings.
     times
         File with one time stamp per left image.
 
@@ -137,7 +137,7 @@ class StereoFolders(UnlistedSequence):
         If there is no pair, or its images cannot be paired, or the time stamps do not
         fit.
     SettingsError
-        If the settings are wrong.
+        If the settings are invalid.
     """
 
     layout = "images of a pair"
@@ -183,7 +183,7 @@ class StereoFolders(UnlistedSequence):
 
 
 def _doubt(pair: ImagePair, settings: SettingsChoice) -> str | None:
-    """Tell why images would not be taken as a pair unless the user asks for one."""
+    """Return why images count as a pair only on request of the user."""
     if _is_of_one_camera(settings, pair.folder):
         return "the settings are of a single camera"
     try:
@@ -194,7 +194,7 @@ def _doubt(pair: ImagePair, settings: SettingsChoice) -> str | None:
 
 
 def _is_of_one_camera(settings: SettingsChoice, folder: Path) -> bool:
-    """Tell whether settings serve for one camera, but not for a pair."""
+    """Return whether settings fit one camera, but not a pair."""
     own = folder / "settings.yaml"
     chosen = own if settings is None and own.is_file() else settings
     if chosen is None:
@@ -211,7 +211,7 @@ def _is_of_one_camera(settings: SettingsChoice, folder: Path) -> bool:
 
 
 def _paired(pair: ImagePair) -> tuple[list[tuple[str, Path, Path]], str]:
-    """Return name, left and right image of every frame, and how they were paired."""
+    """Return name, left and right image of every frame, and the method of pairing."""
     left, right = pair.left_files, pair.right_files
     names, others = list(left), list(right)
     fewer = min(len(left), len(right))
@@ -242,7 +242,7 @@ def _paired(pair: ImagePair) -> tuple[list[tuple[str, Path, Path]], str]:
 
 
 def _numbers(names: list[str]) -> dict[int, str]:
-    """Names by the last number in them; nothing if two have the same."""
+    """Return names by the last number in them; nothing if two have the same number."""
     found = [re.findall(r"[0-9]+", name) for name in names]
     if not all(found):
         return {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time stamps of images that carry none: from a rate, or from a text file."""
+"""Time stamps for images without any: from a rate, or from a text file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FIELDS = {1, 2, 4}
 
 
 def stamps_of_rate(n: int, fps: float) -> Stamps:
-    """Make time stamps from 0 on at a constant rate.
+    """Make time stamps from 0 at a constant rate.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def stamps_of_seconds(seconds: FloatArray) -> Stamps:
 
 
 def stamps_of_names(files: list[Path]) -> Stamps | None:
-    """Take the names of images as their times, if all are and grow.
+    """Use the names of images as their times, if all are times and increase.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def stamps_of_names(files: list[Path]) -> Stamps | None:
     -------
     Stamps or None
         None if a name is neither decimal seconds nor a whole number of milli-, micro- or
-        nanoseconds since 1970, or they do not grow.
+        nanoseconds since 1970, or if they do not increase.
     """
     texts = [seconds_of_name(path.stem) for path in files]
     if None in texts:
@@ -66,7 +66,7 @@ def stamps_of_names(files: list[Path]) -> Stamps | None:
 
 
 def seconds_of_name(stem: str) -> str | None:
-    """Return the time that a name is, in seconds; None if it is none."""
+    """Return the time in a name, in seconds; None if it is no time."""
     if re.fullmatch(r"\d+\.\d+", stem):
         return stem
     if not (re.fullmatch(r"[0-9]+", stem) and len(stem) in _PARTS_OF_SECOND):
@@ -80,12 +80,12 @@ def read_time_file(
 ) -> Stamps:
     """Read one time stamp per image: seconds, milli-, micro- or nanoseconds, or dates.
 
-    The unit is the one that fits the frame rate; see `orbslam2py.datasets.clock`. Empty lines and
+    The unit is that which fits the frame rate; see `orbslam2py.datasets.clock`. Empty lines and
     lines starting with ``#`` are left out.
 
-    Lists with the images' files in the second field are read as well, such as ``rgb.txt`` and
-    associations of TUM RGB-D, or EuRoC's ``data.csv``. The names of the files count then, without
-    their folders, and what is listed beyond them is left out.
+    Lists with the images' files in the second field are also read, such as ``rgb.txt`` and
+    associations of TUM RGB-D, or EuRoC's ``data.csv``. Then lines are assigned by file names,
+    without folders; other lines are ignored.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def read_time_file(
     Raises
     ------
     DatasetError
-        If the file cannot be read or does not hold `n` increasing numbers.
+        If the file cannot be read or does not contain `n` increasing numbers.
     """
     lines = _uniform_lines(path)
     if names is not None and lines and len(lines[0].fields) > 1:
@@ -124,7 +124,7 @@ def read_time_file(
 
 
 def _uniform_lines(path: Path) -> list[TextLine]:
-    """Split into fields, at commas if there are any, and see that all lines have as many."""
+    """Split into fields, at commas if there are any, and check that all lines have as many."""
     lines = content_lines(path)
     if any("," in field for line in lines for field in line.fields):
         lines = content_lines(path, separator=",")
@@ -142,7 +142,7 @@ def _uniform_lines(path: Path) -> list[TextLine]:
 
 
 def _as_the_head_says(head: TextLine, lines: list[TextLine]) -> list[TextLine]:
-    """Take time and file by the names of the columns; all columns if no name tells the time."""
+    """Choose time and file by the names of the columns; all columns if no name means a time."""
     names = [name.lower() for name in head.fields]
     time = next((k for k, name in enumerate(names) if "time" in name or "stamp" in name), None)
     if time is None or any(len(line.fields) != len(names) for line in lines):

@@ -37,7 +37,7 @@ class ImageList:
     stamps
         When each was taken.
     paths
-        Their files, as the list names them: from the folder that it lies in.
+        Their files, as in the list: relative to the folder of the list.
     """
 
     stamps: Stamps
@@ -54,7 +54,7 @@ class TumSequence(RecordedSequence):
     sensor
         Monocular or RGB-D; by default RGB-D if there is depth.
     settings
-        Settings, a file, a built-in name, or None to let the folder decide.
+        Settings, a file, a built-in name, or None to choose by the folder.
     association
         Lines ``t_rgb path_rgb t_depth path_depth``. By default a file of the usual names in the
         folder, else colour and depth images are associated by their time stamps.
@@ -62,9 +62,9 @@ class TumSequence(RecordedSequence):
     Raises
     ------
     DatasetError
-        Naming the file, and the line if a list is malformed.
+        The message names the file, and the line if a list is malformed.
     SettingsError
-        If the settings are wrong.
+        If the settings are invalid.
     """
 
     layout = Layout.TUM
@@ -178,7 +178,7 @@ def _clock(path: Path, lines: list[TextLine], field: int, fps: float | None) -> 
 
 
 def _split_association(path: Path, line: TextLine) -> tuple[str, str]:
-    """Split ``time path time path``, whose paths may hold blanks."""
+    """Split ``time path time path``, whose paths may contain spaces."""
     fields = line.fields
     between = [k for k in range(2, len(fields) - 1) if is_time(fields[k])]
     if not between:
@@ -190,7 +190,7 @@ def _split_association(path: Path, line: TextLine) -> tuple[str, str]:
 
 
 def _is_depth_first(folder: Path, first: str, second: str) -> bool:
-    """Whether the first image of an association is the depth: by the folders' names, or pixels."""
+    """Return whether the first image of an association is depth, by names or pixels."""
     names = [Path(one).parent.name.lower() or Path(one).name.lower() for one in (first, second)]
     tells = ["depth" in name for name in names]
     if tells[0] != tells[1]:
@@ -203,9 +203,10 @@ def _is_depth_first(folder: Path, first: str, second: str) -> bool:
 
 
 def _found_here(source: Path, listed: list[str]) -> tuple[str, ...]:
-    """Return the paths of a list as they lie below its folder.
+    """Return the paths of a list relative to its folder.
 
-    A list of another computer names images by paths that are not here: their last parts are.
+    A list from another computer may have paths that do not exist here; then their last parts are
+    used.
     """
     folder = source.parent
     if not listed or (folder / listed[0]).exists():
@@ -222,7 +223,7 @@ def _found_here(source: Path, listed: list[str]) -> tuple[str, ...]:
 
 
 def _parts_of(path: str) -> list[str]:
-    """Split a path of any system, without its root."""
+    """Split a path of any operating system, without its root."""
     return [part for part in re.split(r"[/\\\\]+", path) if part and not part.endswith(":")]
 
 

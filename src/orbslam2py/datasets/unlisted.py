@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What sequences have in common whose images stand in no list: they are paired by their names."""
+"""Common parts of sequences without a list: images are paired by their names."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class UnlistedSequence(RecordedSequence):
         return self._paths[index], self._partners[index]
 
     def _choose_times(self, names: list[Path], times: str | Path | None) -> str:
-        """Set the time stamps, and say where they come from.
+        """Set the time stamps, and log their source.
 
         Parameters
         ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What images without any other data have in common: of a camera, or of a pair side by side."""
+"""Common parts of images without other data: of a camera, or of a pair side by side."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from orbslam2py.trajectory import Trajectory
 
 
 class UnposedSource:
-    """Images without true poses and without calibration.
+    """Images without ground truth and without calibration.
 
     Parameters
     ----------
@@ -30,20 +30,20 @@ class UnposedSource:
     name
         Name of the source for results.
     sensor
-        Monocular, or stereo if images are split; by default the latter if they are.
+        Monocular, or with split images stereo, which is then the default.
     settings
         Settings, a file or a built-in name.
     fps
         Images per second; replaces that of the settings if given.
     split
-        Whether every image holds the left view in its left half, the right view in its right half.
+        Whether the left and right half of every image are the left and right view.
 
     Raises
     ------
     DatasetError
         For another sensor.
     SettingsError
-        If there are no settings, or they or the rate are wrong.
+        If there are no settings, or if they or the rate are invalid.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class UnposedSource:
         Raises
         ------
         DatasetError
-            If it holds two views side by side, and they shall not be split.
+            If it has two views side by side, and they should not be split.
         ImageError
             If it cannot be split.
         """
@@ -109,7 +109,7 @@ def _choose_sensor(what: str | Path, sensor: Sensor | str | None, *, split: bool
 
 
 def with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
-    """Return the camera with the rate that was given by hand.
+    """Return the camera with the rate that the user gave.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
 
 
 def checked_rate(fps: float) -> float:
-    """Take a rate that was given by hand where there may be no settings yet; as `with_rate`."""
+    """Use a rate that the user gave, if there may be no settings yet; as `with_rate`."""
     return with_rate(CameraSettings(fx=1.0, fy=1.0, cx=0.0, cy=0.0), fps).fps
 
 
@@ -135,7 +135,7 @@ def chosen_stamps(
     names: Sequence[str] | None = None,
     rate: float | None = None,
 ) -> Stamps:
-    """Choose the time stamps of images: from a rate, from a file, or else their own.
+    """Choose the time stamps of images: from a rate, from a file, or their own.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def chosen_stamps(
     times
         File with a time stamp per image, or a list of images with their time stamps, or None.
     otherwise
-        Time stamps, or a rate, if neither is given.
+        Time stamps, or a rate, if the user gives neither.
     names
         Names of the images' files, if they have any.
     rate
@@ -157,7 +157,7 @@ def chosen_stamps(
     DatasetError
         If both are given, or the file does not fit.
     SettingsError
-        If the rate is none.
+        If the rate is invalid.
     """
     if fps is not None and times is not None:
         raise DatasetError(

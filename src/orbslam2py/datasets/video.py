@@ -35,10 +35,10 @@ _MOST_FRAMES = 1e9
 
 
 class VideoReader:
-    """Frames of a video file by their number, exact whatever the distance of its key frames.
+    """Frames of a video file by their number, exact for any distance of its key frames.
 
-    Frames are decoded one after the other. Going forward decodes what lies between, going back
-    begins anew: seeking in compressed video may end at another frame than the one asked for.
+    Frames are decoded one after the other. Going forward decodes the frames between, going back
+    starts at the beginning: a seek in compressed video may end at another frame.
 
     Parameters
     ----------
@@ -63,8 +63,7 @@ class VideoReader:
     def scan(self) -> FloatArray:
         """Decode the file once and return the time of every frame in seconds, float64 (n,).
 
-        What files say about their number of frames is often wrong; a warning tells where much of
-        what they promise is missing.
+        The number of frames in a file's header is often wrong; a warning says if many are missing.
 
         Raises
         ------
@@ -90,7 +89,7 @@ class VideoReader:
         return np.array(seconds, dtype=np.float64)
 
     def _promised_seconds(self) -> float:
-        """What the file says of its length; 0 if it does not."""
+        """Return the length in the file's header; 0 if there is none."""
         n_frames = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
         known = math.isfinite(n_frames) and 0 < n_frames < _MOST_FRAMES and self.fps
         return n_frames / self.fps if known else 0.0
@@ -127,7 +126,7 @@ class VideoReader:
         return np.asarray(image, dtype=np.uint8)
 
     def frames(self, step: int = 1) -> Iterator[ByteArray | ImageError]:
-        """Yield every `step`-th frame from the beginning; an error in the place of a bad one.
+        """Yield every `step`-th frame from the beginning, or an error for a bad one.
 
         Parameters
         ----------
@@ -202,14 +201,14 @@ class VideoSequence(FramesInOrder, UnposedSource):
     times
         File with one time stamp per frame.
     split
-        Whether every frame holds the left view in its left half, the right view in its right half.
+        Whether the left and right half of every frame are the left and right view.
 
     Raises
     ------
     DatasetError
         If the file is no video or has no frames, or the time stamps do not fit.
     SettingsError
-        If there are no settings, or they are wrong.
+        If there are no settings, or they are invalid.
     """
 
     layout = "video"
@@ -247,7 +246,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
         return self._stamps.texts[index_of(index, len(self))]
 
     def default_settings(self) -> Settings:
-        """Return the settings: a video has no others."""
+        """Return the settings; a video has none of its own."""
         return self.settings
 
     def load(self, index: int, /) -> Images:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
+"""Evaluation against ground truth: trajectories, laps, poses in a map, closed loops."""
 
 from orbslam2py.evaluation.alignment import Alignment, FitByTime, differ_in_unit, fit_by_time
 from orbslam2py.evaluation.conventions import OtherReading, find_other_reading

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a trajectory fits the truth much better when its file is read by another convention.
+"""Whether a trajectory fits the ground truth much better if its file has another convention.
 
-Two conventions are often taken for each other: the order of a quaternion (w last or first), and
-the direction of a pose (camera in the world or world in the camera). Positions do not show the
-first, and the angles of rotations show neither: reading w at the wrong end gives the inverse
-rotations in other axes. Motions between poses, seen from the moving camera, show both.
+Two conventions are often confused: the order of a quaternion (w last or first), and the direction
+of a pose (camera in the world or world in the camera). Positions do not show a wrong order, and
+neither do rotation angles: with w at the wrong end, a quaternion is the inverse rotation in other
+axes. Motions between poses, in the frame of the moving camera, show both errors.
 """
 
 from __future__ import annotations
@@ -41,20 +41,21 @@ _CLEARLY = 1.5  # by which one reading must fit better than another that is more
 
 @dataclass(frozen=True, eq=False)
 class OtherReading:
-    """A reading of a file by which the estimate fits the truth much better.
+    """Another reading of a file, with which the estimate fits the ground truth much better.
 
     Attributes
     ----------
     of_truth
-        Whether the file of the truth is to be read otherwise; that of the estimate else.
+        Whether the file of the ground truth has the other convention; otherwise that of the
+        estimate.
     quaternions
-        The order in which to read its quaternions; None to leave it.
+        The order of its quaternions; None: unchanged.
     inverse
-        Whether its poses are those of the world in the camera; None to leave it.
+        Whether its poses are those of the world in the camera; None: unchanged.
     either
-        Whether the file of the other one may as well be the one that is to be read otherwise.
+        Whether the other file may have the other convention instead.
     as_read, otherwise
-        The figures as the files were read, and with the other reading.
+        The figures before and with the other reading.
     """
 
     of_truth: bool
@@ -66,7 +67,7 @@ class OtherReading:
 
     @property
     def options(self) -> str:
-        """What to change on the command line of ``orbslam2py evaluate``."""
+        """Return the change of the command line of ``orbslam2py evaluate``."""
         prefix = "--truth-" if self.of_truth else "--"
         given = [] if self.quaternions is None else [f"give {prefix}quaternions {self.quaternions}"]
         if self.inverse is not None:
@@ -75,7 +76,7 @@ class OtherReading:
 
     @property
     def message(self) -> str:
-        """What the file looks like, by which figures it is seen, and what to do."""
+        """Return a message: the other convention, the figures that show it, and the remedy."""
         whose = "the truth" if self.of_truth else "the estimate"
         looks = []
         if self.quaternions is not None:
@@ -105,7 +106,7 @@ class OtherReading:
 
 @dataclass(frozen=True)
 class _Fit:
-    """How well an estimate fits the truth: two figures in parts of the size of the path."""
+    """Two figures of the fit of an estimate, relative to the size of the path."""
 
     positions: float
     motions: float
@@ -134,26 +135,26 @@ def find_other_reading(
     offset: float = 0.0,
     timed: bool = True,
 ) -> OtherReading | None:
-    """See whether another convention makes an estimate fit the truth much better.
+    """Search another convention with which an estimate fits the ground truth much better.
 
-    Tried are the other order of the quaternions, inverse poses, and both; for the estimate and for
-    the truth. An order that stands in the head of the file, or that the caller gave, is not
-    doubted. Nothing is found in paths of less than 10 matched poses, and in those that turn by less
-    than 5 degrees.
+    The other order of quaternions, inverse poses, and both are tried, for the estimate and for the
+    ground truth. An order in the header of the file, or given by the caller, is not questioned.
+    Nothing is found in paths with less than 10 matched poses or with less than 5 degrees of
+    rotation.
 
     Parameters
     ----------
     estimate, truth, alignment, single_camera, max_difference, offset, timed
         As of `evaluate_trajectory`.
     estimate_reading, truth_reading
-        How their files were read, from `read_trajectory_file`; by default as TUM's.
+        The conventions of their files, from `read_trajectory_file`; by default those of TUM.
     T_body_camera
-        What true poses of the body were multiplied by to get those of the camera, float64 (4, 4).
+        Factor that turned true poses of the body into those of the camera, float64 (4, 4).
 
     Returns
     -------
     OtherReading or None
-        None if the files are right as they were read, or if it cannot be seen.
+        None if the files are right, or if the data do not show it.
 
     Raises
     ------
@@ -210,7 +211,7 @@ def find_other_reading(
 def _best_reading(
     pair: tuple[FloatArray, FloatArray], readings: list[Reading], extrinsics: FloatArray | None
 ) -> tuple[int, bool, bool, bool] | None:
-    """Side (0 estimate, 1 truth), whether to swap the order, to invert, whether it is either."""
+    """Return side (0 estimate, 1 truth), whether to swap, to invert, whether either fits."""
     if not all(np.isfinite(poses).all() and _turns(poses) for poses in pair):
         return None
     lag = _lag(pair[1])
@@ -238,7 +239,7 @@ def _best_reading(
 def _read_again(
     T_wc: FloatArray, reading: Reading, *, swap: bool, invert: bool, by: FloatArray | None
 ) -> FloatArray:
-    """Poses (n, 4, 4) as the file gives them in another reading."""
+    """Return poses (n, 4, 4) of the file in another reading."""
     T = T_wc if by is None else T_wc @ inverse_poses(by)
     T = inverse_poses(T) if reading.inverse else T
     if swap:
@@ -255,7 +256,7 @@ def _turns(T: FloatArray) -> bool:
 
 
 def _lag(T: FloatArray) -> int:
-    """Steps between poses to compare: many, so that noise matters little, but no large turns."""
+    """Return the steps between compared poses: long, but without large rotations."""
     lag = 1
     while 2 * lag <= len(T) // 4:
         turned = rotation_angles(np.swapaxes(T[: -2 * lag, :3, :3], 1, 2) @ T[2 * lag :, :3, :3])
@@ -277,7 +278,7 @@ def _fit(estimate: FloatArray, truth: FloatArray, lag: int) -> _Fit:
 
 
 def _motions(T: FloatArray, lag: int) -> tuple[FloatArray, FloatArray]:
-    """Turns (as sines of the half angle) and shifts, seen from the first of both poses."""
+    """Return rotations (sines of the half angle) and translations, in the first pose's frame."""
     moved = inverse_poses(T[:-lag]) @ T[lag:]
     q = quaternions_from_rotations(moved[:, :3, :3])
     return q[:, :3] * np.where(q[:, 3:] < 0, -1.0, 1.0), moved[:, :3, 3]
@@ -286,7 +287,7 @@ def _motions(T: FloatArray, lag: int) -> tuple[FloatArray, FloatArray]:
 def _difference_of_motions(
     estimate: tuple[FloatArray, FloatArray], truth: tuple[FloatArray, FloatArray]
 ) -> float:
-    """Difference in parts of the motions, but for a fixed turn between both bodies and a scale."""
+    """Return relative differences of motions, up to a fixed rotation and a scale."""
     sizes = [max(_size(a), _size(b), 1e-12) for a, b in zip(estimate, truth, strict=True)]
     turns = estimate[0] / sizes[0], truth[0] / sizes[0]
     shifts = estimate[1] / max(_size(estimate[1]), 1e-12), truth[1] / max(_size(truth[1]), 1e-12)

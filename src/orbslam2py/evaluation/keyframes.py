@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Errors of single poses in a map, taken so that the drift of the map itself does not count.
+"""Errors of single poses in a map, without the drift of the map.
 
-A pose is compared with the keyframe that is nearest to it in truth: the estimated motion from the
-keyframe to the camera against the true one. This tells how exactly a camera has been found in its
-map, even where the map as a whole lies beside the truth.
+A pose is compared with the truly nearest keyframe: the estimated motion from the keyframe to the
+camera is compared with the true one. The result is the accuracy of localization in a map, even if
+the whole map is distorted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 @dataclass(frozen=True)
 class PoseError:
-    """How far one pose is from the true one.
+    """The error of one pose.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class PoseError:
     rotation_deg: float
 
     def is_within(self, metres: float, degrees: float) -> bool:
-        """Whether neither of the two is larger."""
+        """Return whether neither value of this error exceeds that of the other."""
         return self.translation_m <= metres and self.rotation_deg <= degrees
 
 
@@ -52,7 +52,7 @@ def pose_error(estimate: FloatArray, truth: FloatArray) -> PoseError:
 
 
 def nearest_keyframes(true_T_wc: FloatArray, true_T_wk: FloatArray) -> IntArray:
-    """Find the keyframe that is nearest to each camera; a metre is as far as a radian.
+    """Find the keyframe nearest to each camera; one metre counts as much as one radian.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def errors_through_keyframes(
     *,
     metres_per_unit: float = 1.0,
 ) -> tuple[FloatArray, FloatArray]:
-    """Take the errors of poses relative to the nearest keyframes of their map.
+    """Compute the errors of poses relative to the nearest keyframes of their map.
 
     Parameters
     ----------
@@ -100,14 +100,13 @@ def errors_through_keyframes(
     T_wk, true_T_wk
         The same of the keyframes, (k, 4, 4) each, at least one.
     metres_per_unit
-        What a unit of length of the map is worth. Not 1 with a single camera only: there it is the
+        Metres per unit of length of the map. Only a single camera needs another value than 1: the
         scale of `align` from estimated to true positions.
 
     Returns
     -------
     translations, rotations
-        Size of the difference of estimated and true motion from the keyframe, (n,) [m] and
-        (n,) [rad].
+        Difference of estimated and true motion from the keyframe, (n,) [m] and (n,) [rad].
 
     Raises
     ------

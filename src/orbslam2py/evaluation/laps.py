@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a lap has gathered in drift: error of the motion from start to end, and change of scale.
+"""The drift of a lap: error of the motion from start to end, and change of scale.
 
-Alignment over the whole path hides both; they tell whether a loop has been closed well.
+Alignment of the whole path hides both; they show the quality of a loop closure.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class LapError:
     Attributes
     ----------
     translation_m
-        Distance of the estimated end from the true one, both seen from the start [m].
+        Distance of the estimated end from the true one, both in the frame of the start [m].
     rotation_deg
-        Angle between the estimated and the true turn from start to end [deg].
+        Angle between the estimated and the true rotation from start to end [deg].
     path_m
         Length of the true path between them [m].
     """
@@ -57,7 +57,7 @@ def lap_error(
     with_scale: bool = False,
     max_difference: float = MAX_DIFFERENCE,
 ) -> LapError:
-    """Take the error of the motion from the start of a lap to its end.
+    """Compute the error of the motion from the start of a lap to its end.
 
     Parameters
     ----------
@@ -66,16 +66,16 @@ def lap_error(
     truth
         True poses of the same camera in any world.
     length
-        Metres along the true path after which the lap ends; by default with the last pose.
+        Length of the lap along the true path [m]; by default it ends with the last pose.
     with_scale
         For one camera: the estimate is first scaled so that it fits the true path best.
     max_difference
-        Poses belong together if their time stamps differ by less [s].
+        Largest difference of matching time stamps [s].
 
     Raises
     ------
     DatasetError
-        If no time stamps match, a pose is none, or the estimate ends before the lap does.
+        If no time stamps match, a pose is invalid, or the estimate ends before the lap.
     """
     estimated, true, along = _lap(estimate, truth, length, max_difference)
     ends = (np.array([0]), np.array([len(true) - 1]))
@@ -94,7 +94,7 @@ def scale_drift(
     window: float | None = None,
     max_difference: float = MAX_DIFFERENCE,
 ) -> float:
-    """Take the change of scale over a lap: 0.02 if its end is drawn 2 % larger than its start.
+    """Compute the change of scale over a lap: 0.02 if its end is 2 % larger than its start.
 
     Parameters
     ----------
@@ -103,18 +103,18 @@ def scale_drift(
     truth
         True poses of the same camera in any world.
     length
-        Metres along the true path after which the lap ends; by default with the last pose.
+        Length of the lap along the true path [m]; by default it ends with the last pose.
     window
-        Metres at the start and at the end of the lap whose scale is taken, each by aligning it to
-        the truth; a tenth of the lap by default.
+        Length of the two windows at the start and the end of the lap [m]. Each is aligned to the
+        ground truth to measure its scale. By default a tenth of the lap.
     max_difference
-        Poses belong together if their time stamps differ by less [s].
+        Largest difference of matching time stamps [s].
 
     Raises
     ------
     DatasetError
-        If no time stamps match, a pose is none, the estimate ends before the lap does, or a window
-        holds fewer than three poses.
+        If no time stamps match, a pose is invalid, the estimate ends before the lap, or a window
+        contains fewer than three poses.
     """
     estimated, true, along = _lap(estimate, truth, length, max_difference)
     metres = 0.1 * along[-1] if window is None else window

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Closed loops against the truth: which are true, and which places seen again were missed."""
+"""Closed loops against ground truth: true loops, and missed revisits of places."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _TOLERANCE_DEGREES = 10.0
 
 @dataclass(frozen=True)
 class LoopError:
-    """How far a loop's relative pose is from the true one.
+    """The error of a loop's relative pose.
 
     Attributes
     ----------
     distance_m
         True distance of the two cameras [m].
     translation_m
-        Distance of the claimed from the true position of the present camera, both seen from the
-        matched one [m].
+        Distance of the estimated from the true position of the current camera, both in the frame of
+        the matched one [m].
     rotation_deg
-        Angle between its claimed and its true orientation [deg].
+        Angle between its estimated and its true orientation [deg].
     """
 
     distance_m: float
@@ -42,14 +42,14 @@ class LoopError:
 
     @property
     def is_true(self) -> bool:
-        """The cameras are where the loop says: within 0.3 m, 2 % of their distance and 10 deg."""
+        """Whether the loop is true: errors within 0.3 m plus 2 % of the distance, and 10 deg."""
         tolerance = _TOLERANCE_METRES + _TOLERANCE_OF_DISTANCE * self.distance_m
         return self.translation_m <= tolerance and self.rotation_deg <= _TOLERANCE_DEGREES
 
 
 @dataclass(frozen=True)
 class Revisit:
-    """Time during which the camera is at places where it has been before.
+    """A period in which the camera is at known places.
 
     Attributes
     ----------
@@ -61,25 +61,25 @@ class Revisit:
     end: float
 
     def seconds_from(self, timestamp: float) -> float:
-        """How long before or after it a time stamp is; 0 within."""
+        """Return how long before or after it a time stamp is; 0 within it."""
         return max(self.begin - timestamp, timestamp - self.end, 0.0)
 
 
 def loop_error(
     S_cm: FloatArray, true_T_wc: FloatArray, true_T_wm: FloatArray, *, metres_per_unit: float = 1.0
 ) -> LoopError:
-    """Compare what a loop says with the truth.
+    """Compare a loop with the ground truth.
 
     Parameters
     ----------
     S_cm
-        The loop: similarity (4, 4) from the matched to the present camera. Its scale is what drift
-        has made of the unit of length between the two, so its translation is divided by it.
+        The loop: similarity (4, 4) from the matched to the current camera. Its scale is the drift
+        of the unit of length between the two; the translation is divided by it.
     true_T_wc, true_T_wm
-        True poses of the present and of the matched camera, camera to world (4, 4) [m].
+        True poses of the current and of the matched camera, camera to world (4, 4) [m].
     metres_per_unit
-        Of the map around the matched keyframe, see `metres_per_unit_at`; 1 unless there is only one
-        camera.
+        Scale of the map around the matched keyframe, see `metres_per_unit_at`; 1 except for a
+        single camera.
     """
     scale = np.cbrt(np.linalg.det(S_cm[:3, :3]))
     # Of the similarity: position and axes of the present camera in the matched one.
@@ -102,7 +102,7 @@ def metres_per_unit_at(
     *,
     max_difference: float = MAX_DIFFERENCE,
 ) -> float:
-    """Take the scale of a map of one camera where the camera was at a time.
+    """Measure the scale of a single camera's map around a time.
 
     Parameters
     ----------
@@ -113,14 +113,14 @@ def metres_per_unit_at(
     truth
         True poses of the same camera in any world [m].
     reach
-        Poses up to so far along the true path before and after are taken [m].
+        Poses within this distance along the true path, before and after, are used [m].
     max_difference
-        Poses belong together if their time stamps differ by less [s].
+        Largest difference of matching time stamps [s].
 
     Raises
     ------
     DatasetError
-        If no time stamps match, or fewer than three poses are within reach.
+        If no time stamps match, or fewer than three poses are within this distance.
     """
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
@@ -139,18 +139,18 @@ def metres_per_unit_at(
 def find_revisits(
     truth: Trajectory, *, near: float, apart: float, degrees: float = 30.0
 ) -> list[Revisit]:
-    """Find when the camera is where it has been, and looks the same way.
+    """Find when the camera is at a known place with the same viewing direction.
 
     Parameters
     ----------
     truth
         True poses, camera to world with z ahead [m].
     near
-        Distance that still is the same place [m].
+        Largest distance of two positions at the same place [m].
     apart
-        Metres of path that must lie between the two visits; gaps shorter than it do not end one.
+        Length of path that must be between the two visits [m]; shorter gaps do not end a visit.
     degrees
-        Angle between the two views that still is the same direction [deg].
+        Largest angle between two views of the same direction [deg].
     """
     truth = truth.select(time_order(truth))
     along = lengths_along(truth.positions)
@@ -171,9 +171,9 @@ def find_revisits(
 
 
 def closed_revisits(revisits: Sequence[Revisit], timestamps: FloatArray) -> NDArray[np.bool_]:
-    """Tell for every revisit whether one of the true loops belongs to it.
+    """Return for every revisit whether a true loop belongs to it.
 
-    A loop may close a little before or after, since the same places are seen from further away: it
+    A loop may close slightly before or after, because a place is visible from a distance: it
     belongs to the revisit nearest in time.
 
     Parameters
@@ -181,7 +181,7 @@ def closed_revisits(revisits: Sequence[Revisit], timestamps: FloatArray) -> NDAr
     revisits
         From `find_revisits`.
     timestamps
-        Of the present cameras of the true loops, (l,) [s].
+        Time stamps of the current cameras of the true loops, (l,) [s].
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which poses of an estimate and of the truth are compared, and how much of the path they cover."""
+"""Which poses of an estimate and of the ground truth are compared, and their share of the path."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ class Matched:
     poses
         Pairs of an estimated and a true pose.
     estimate_poses, truth_poses
-        How many there were, without lost ones.
+        Numbers of poses, without lost ones.
     first, last
         Time stamps of the first and the last matched pose of the estimate [s].
     path
-        Length of the true path that they cover [m], without gaps: steps between matched poses of
-        more than a second and of five times the usual step.
+        Length of the true path that they cover [m], without gaps. A gap is a step between matched
+        poses of more than a second and more than five times the usual step.
     truth_path
         Length of the whole true path [m].
     median_difference, max_difference
-        By how much the time stamps of the pairs differ [s].
+        Differences of the time stamps of the pairs [s].
     is_timed
-        Whether time stamps are seconds; numbers of frames else.
+        Whether time stamps are seconds; otherwise numbers of frames.
     """
 
     poses: int
@@ -69,14 +69,14 @@ class Matched:
 def match_poses(
     estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
 ) -> tuple[IntArray, IntArray]:
-    """Find which poses belong together by their time stamps.
+    """Match the poses of two trajectories by their time stamps.
 
     Parameters
     ----------
     estimate, truth
         Both on one clock.
     max_difference
-        Poses belong together if their time stamps differ by less [s].
+        Largest difference of matching time stamps [s].
 
     Returns
     -------
@@ -98,14 +98,14 @@ def match_poses(
 
 
 def time_order(trajectory: Trajectory) -> IntArray:
-    """Order poses by their time stamps: in files they may stand in any order.
+    """Order poses by their time stamps: files may have any order.
 
-    Along a path metres are only counted in this order.
+    The length of a path needs this order.
 
     Returns
     -------
     IntArray
-        Indices of the poses, (n,); those of one time stamp stay as they are.
+        Indices of the poses, (n,); poses of equal time keep their order.
     """
     return np.argsort(trajectory.timestamps, kind="stable")
 
@@ -113,7 +113,7 @@ def time_order(trajectory: Trajectory) -> IntArray:
 def describe_match(
     estimate: Trajectory, truth: Trajectory, i: IntArray, j: IntArray, *, timed: bool = True
 ) -> Matched:
-    """Say what `match_poses` has found.
+    """Describe the result of `match_poses`.
 
     Parameters
     ----------

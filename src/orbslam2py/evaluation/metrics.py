@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far an estimated trajectory is from the true one.
+"""Errors of an estimated trajectory against the true one.
 
 Absolute trajectory error and relative pose error as Sturm et al. (IROS 2012) define them, errors
 over path segments as the KITTI odometry benchmark does (Geiger et al., CVPR 2012).
@@ -37,7 +37,7 @@ _Value = TypeVar("_Value")
 
 @dataclass(frozen=True)
 class ErrorStatistics:
-    """Figures over many errors of one kind, in the unit of the errors.
+    """Statistics of errors of one kind, in the unit of the errors.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class ErrorStatistics:
 
     @classmethod
     def of(cls, errors: FloatArray) -> ErrorStatistics | None:
-        """Take the figures of errors, float64 (n,); None if there are none, or not all finite."""
+        """Compute the statistics of errors (n,); None if there are none, or not all finite."""
         if not len(errors) or not np.isfinite(errors).all():
             return None
         return cls(
@@ -74,22 +74,22 @@ class Evaluation:
     matched
         Which poses were compared.
     alignment
-        How they were aligned; never ``auto``, but what it has chosen.
+        The alignment that was used; never ``auto``.
     transform
         From the estimate's world to the true one.
     single_camera
-        Whether the estimate is of one camera without depth; None if it is not known.
+        Whether the estimate is of a single camera without depth; None if it is not known.
     unit_factor
-        What lengths would have to be multiplied by, if they are in another unit than the truth,
-        as those of a single camera are; None if they are not, or if it cannot be seen.
+        Factor on lengths, if their unit differs from that of the ground truth, as with a single
+        camera; None if it does not differ, or is not known.
     ate
         Distance of aligned and true positions [m]; None for a single pose, and with ``sim3`` for
-        two: any of them can be brought onto the truth.
+        two, because any of them can be aligned perfectly.
     rpe_translation, rpe_rotation
         Error of the motion from one matched pose to the next [m], [deg]; None for a single pose.
-        No lengths if ``sim3`` has too few poses to find the scale.
+        Without lengths if ``sim3`` has too few poses for the scale.
     rpe_translation_1s, rpe_rotation_1s
-        The same over one second; None if the sequence is shorter or has no time stamps.
+        The same over one second; None if the sequence is shorter or has no times.
     t_rel_percent, r_rel_deg_per_100m
         KITTI's mean errors over segments of 100 to 800 m; None for shorter paths.
     """
@@ -109,12 +109,12 @@ class Evaluation:
 
     @property
     def matched_poses(self) -> int:
-        """Poses of the estimate that have a true pose at their time."""
+        """Poses of the estimate that have a true pose at the same time."""
         return self.matched.poses
 
     @property
     def hint(self) -> str:
-        """What to try, if the alignment does not fit the estimate; empty if there is nothing."""
+        """Return advice if the alignment does not fit the estimate; otherwise empty."""
         if self.alignment is Alignment.SIM3 or self.single_camera is False:
             return ""
         if self.unit_factor is None and not self.single_camera:
@@ -127,7 +127,7 @@ class Evaluation:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures under the names that reports use; None where there is none."""
+        """Return the figures under the names in reports; None for missing ones."""
         ate, matched = self.ate, self.matched
         timed = matched.is_timed
         return {
@@ -177,14 +177,14 @@ def evaluate_trajectory(
         world. With ``sim3`` the relative errors are those of the scaled estimate. ``auto`` takes
         ``sim3`` for a single camera and ``se3`` for others.
     single_camera
-        Whether the estimate is of one camera without depth, for ``auto``. If it is not known,
-        lengths that differ by a factor above 1.5 tell it, where scaling halves the error.
+        Whether the estimate is of one camera without depth, for ``auto``. If it is not known, it is
+        assumed if lengths differ by a factor above 1.5 and scaling halves the error.
     max_difference
-        Poses belong together if their time stamps differ by less [s].
+        Largest difference of matching time stamps [s].
     offset
-        Added to the time stamps of the estimate [s], if the clocks differ.
+        Seconds that are added to the time stamps of the estimate, if the clocks differ.
     timed
-        False if the time stamps are only frame numbers: no figures over one second then.
+        False if the time stamps are only frame numbers: then there are no figures over one second.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def evaluate_trajectory(
     Raises
     ------
     DatasetError
-        If no time stamps match, or a pose is none: not finite, or without a rotation.
+        If no time stamps match, or a pose is invalid: not finite, or without a rotation.
     """
     alignment = Alignment.of(alignment)
     require_trajectories(estimate, truth)
@@ -225,12 +225,12 @@ def evaluate_trajectory(
 
 
 def require_trajectories(estimate: Trajectory, truth: Trajectory) -> None:
-    """See that both can be compared.
+    """Check that both can be compared.
 
     Raises
     ------
     DatasetError
-        If one is no trajectory, or a pose that is not lost is none: not finite, or without a
+        If one is no trajectory, or a pose that is not lost is invalid: not finite, or without a
         rotation.
     """
     for name, trajectory in (("estimate", estimate), ("truth", truth)):
@@ -240,12 +240,12 @@ def require_trajectories(estimate: Trajectory, truth: Trajectory) -> None:
 
 
 def finite(value: float | None) -> float | None:
-    """Return a value, or None if it is none or not finite."""
+    """Return a value, or None if it is missing or not finite."""
     return value if value is not None and np.isfinite(value) else None
 
 
 def _transform(points: FloatArray, targets: FloatArray, alignment: Alignment) -> Similarity:
-    """Align as far as possible: figures that need no alignment are taken even without one."""
+    """Align if possible: figures that need no alignment are computed even without one."""
     if alignment is Alignment.NONE:
         return Similarity.identity()
     with_scale = alignment is Alignment.SIM3 and len(points) >= alignment.fewest_poses
@@ -256,7 +256,7 @@ def _transform(points: FloatArray, targets: FloatArray, alignment: Alignment) ->
 def _figures(
     aligned: FloatArray, true: FloatArray, times: FloatArray, alignment: Alignment
 ) -> dict[str, Any]:
-    """Compute every figure for itself: one that fails leaves the others alone."""
+    """Compute every figure separately: a failure does not affect the others."""
     n = len(aligned)
     next_pose = (np.arange(n - 1), np.arange(1, n))
     steps = _relative_statistics(aligned, true, next_pose)
@@ -279,7 +279,7 @@ def _figures(
 def relative_errors(
     estimate: FloatArray, truth: FloatArray, pairs: tuple[IntArray, IntArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Take the errors of motions between pairs of poses.
+    """Compute the errors of motions between pairs of poses.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def relative_errors(
     Returns
     -------
     translations, rotations
-        Size of the difference of estimated and true motion, (k,) [m] and (k,) [rad].
+        Difference of estimated and true motion, (k,) [m] and (k,) [rad].
     """
     first, second = pairs
     moved = inverse_poses(estimate[first]) @ estimate[second]
@@ -301,7 +301,7 @@ def relative_errors(
 
 
 def one_second_pairs(times: FloatArray) -> tuple[IntArray, IntArray]:
-    """Pair every pose with the one nearest to a second later, if there is one within 0.1 s.
+    """Pair every pose with the one nearest to a second later, if it is within 0.1 s.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ def one_second_pairs(times: FloatArray) -> tuple[IntArray, IntArray]:
 
 
 def segment_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
-    """Take KITTI's errors over path segments of 100 to 800 m.
+    """Compute KITTI's errors over path segments of 100 to 800 m.
 
     Segments start at every tenth pose and end at the first pose more than their length further
     along the true path.

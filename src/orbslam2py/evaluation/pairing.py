@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses of two files on one clock: by time, or by frame numbers that are known, or not at all.
+"""Poses of two files on one clock: by time, by known frame numbers, or not at all.
 
-A row of a file in KITTI format says nothing about when it was taken. It is only compared where
-that is known from elsewhere: from ``frames.csv`` of the run that it belongs to, from a list of
-times, or because both files have a row for every frame.
+A row of a file in KITTI format has no time. It is compared only if the time is known otherwise:
+from ``frames.csv`` of its run, from a list of times, or because both files have a row for every
+frame.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _END = 0.02  # part of a sequence that may be without a true pose at its end
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Poses of a file, and what is known about when they were taken.
+    """Poses of a file, and all that is known about their times.
 
     Attributes
     ----------
@@ -49,16 +49,16 @@ class Poses:
     is_timed
         Whether the time stamps are times.
     frames
-        The frames of the run that the file belongs to; None if they are not known, or not read.
+        The frames of the run of the file; None if they are not known, or not read.
     frame_times
         Time of every frame of the sequence [s], (n,); None if it is not known.
     frame_table
-        The run's ``frames.csv`` beside the file, which tells `frames`; None if there is none.
+        The run's ``frames.csv`` beside the file, which contains `frames`; None if there is none.
     reading
-        How the file was understood.
+        The format and conventions of the file.
     T_body_camera
-        What poses of a body were multiplied by to get those of the camera, float64 (4, 4); None if
-        they were not.
+        Factor that turned poses of a body into those of the camera, float64 (4, 4); None if there
+        is none.
     """
 
     source: str
@@ -81,13 +81,13 @@ class Paired:
     estimate, truth
         On one clock.
     by
-        What the poses are matched by, for people.
+        Description of the matching, for messages.
     is_timed
-        Whether the time stamps are seconds; numbers of rows else.
+        Whether the time stamps are seconds; otherwise numbers of rows.
     on_clocks
-        Whether each has time stamps of its own, so that an offset makes sense.
+        Whether both have their own time stamps, so that an offset is useful.
     readings
-        How the files of the estimate and of the truth were understood.
+        The formats and conventions of both files.
     """
 
     estimate: Trajectory
@@ -108,19 +108,19 @@ def read_estimate(
 ) -> Poses:
     """Read an estimate, with ``frames.csv`` or ``times.txt`` beside it.
 
-    Rows of a file in KITTI format that only stand for frames without a pose are marked as lost:
-    those that ``frames.csv`` lists without one; without that file the identity at the beginning
-    and repetitions of the row before. For a file with time stamps it is only read when it is
-    needed, and one of another program never is.
+    In KITTI format, rows for frames without a pose are marked as lost. ``frames.csv`` lists these
+    frames. Without this file they are identities at the beginning and repetitions of the row
+    before. For a file with time stamps, ``frames.csv`` is read only if needed, and never for a file
+    of another program.
 
     Parameters
     ----------
     path, file_format
-        The file, and what it is.
+        The file, and its format.
     times
-        Times of the frames [s], (n,); used if there are as many as rows and no ``frames.csv``.
+        Times of the frames [s], (n,); used if there are as many as rows, and no ``frames.csv``.
     quaternions, inverse
-        Order of the quaternions, and whether poses are those of the world in the camera; as of
+        Order of the quaternions, and whether poses are those of the world in the camera; see
         `read_trajectory_file`.
 
     Raises
@@ -158,14 +158,14 @@ def read_truth(
     quaternions: QuaternionOrder | None = None,
     inverse: bool = False,
 ) -> Poses:
-    """Read true poses, with ``times.txt`` beside them or where KITTI's benchmark has it.
+    """Read true poses, with ``times.txt`` beside them or in the place of KITTI's benchmark.
 
     Parameters
     ----------
     path, file_format
-        The file, and what it is.
+        The file, and its format.
     times
-        Times of its poses [s], (n,); used if there are as many as rows of KITTI's format.
+        Times of its poses [s], (n,); used if there are as many as rows in KITTI format.
     quaternions, inverse
         As of `read_estimate`.
 
@@ -182,22 +182,22 @@ def read_truth(
 
 
 def pair(estimate: Poses, truth: Poses, *, offset: float = 0.0) -> Paired:
-    """Put an estimate and the truth on one clock.
+    """Put an estimate and the ground truth on one clock.
 
-    Times of a file that make no sense beside those of the other one are taken for times in another
-    unit (s, ms, us, ns), if one of them makes both cover the same time.
+    If the times of the two files do not fit, another unit (s, ms, us, ns) is tried for one of them;
+    it is used if both then cover the same time.
 
     Parameters
     ----------
     estimate, truth
         From `read_estimate` and `read_truth`.
     offset
-        What will be added to the times of the estimate [s].
+        Seconds that will be added to the times of the estimate.
 
     Raises
     ------
     DatasetError
-        If it is not known which rows belong together: saying what to give.
+        If it is not known which rows correspond; the message says what to give.
     """
     estimate, truth = _in_one_unit(estimate, truth, offset)
     return replace(_pair(estimate, truth), readings=(estimate.reading, truth.reading))
@@ -224,7 +224,7 @@ def _pair(estimate: Poses, truth: Poses) -> Paired:
 
 
 def _in_one_unit(estimate: Poses, truth: Poses, offset: float) -> tuple[Poses, Poses]:
-    """Read the times of a file in another unit, if only that brings both together."""
+    """Read the times of a file in another unit, if only this gives a common time."""
     if not (estimate.is_timed and truth.is_timed):
         return estimate, truth
     changed = _in_unit_of(estimate, truth.trajectory.timestamps - offset)
@@ -251,7 +251,7 @@ def _in_unit_of(poses: Poses, other: FloatArray) -> Poses:
 
 
 def rows_without_pose(T_wc: FloatArray) -> NDArray[np.bool_]:
-    """Find rows of KITTI's format that stand for frames without a pose.
+    """Find rows in KITTI format for frames without a pose.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def rows_without_pose(T_wc: FloatArray) -> NDArray[np.bool_]:
     Returns
     -------
     bool (n,)
-        Rows that repeat the one before, and the identity where the file begins with several.
+        Rows that repeat the one before, and several identities at the beginning.
     """
     repeats = np.zeros(len(T_wc), bool)
     repeats[1:] = (T_wc[1:] == T_wc[:-1]).all(axis=(1, 2))
@@ -271,7 +271,7 @@ def rows_without_pose(T_wc: FloatArray) -> NDArray[np.bool_]:
 
 
 def _before_the_map(T_wc: FloatArray) -> NDArray[np.bool_]:
-    """Leading rows with the identity, but for the last, which may be the first pose."""
+    """Leading identities, except the last, which may be the first pose."""
     is_identity = (T_wc == np.eye(4)).all(axis=(1, 2))
     leading = np.logical_and.accumulate(is_identity)
     leading[max(0, int(leading.sum()) - 1) :] = False
@@ -279,7 +279,7 @@ def _before_the_map(T_wc: FloatArray) -> NDArray[np.bool_]:
 
 
 def _by_frame_number(estimate: Poses, truth: Poses) -> Paired:
-    """Pair the frames of a run with the rows of a truth that has one for every frame."""
+    """Pair the frames of a run with the rows of a ground truth that has one for every frame."""
     frames, n = estimate.frames, len(truth.trajectory)
     if frames is None and estimate.frame_table is not None:
         frames = read_frame_table(estimate.frame_table)
@@ -307,7 +307,7 @@ def _last_and_step(indices: IntArray) -> tuple[int, int]:
 
 
 def _all_listed(trajectory: Trajectory, frames: FrameTable) -> bool:
-    """Whether every time stamp is that of a frame of the run."""
+    """Return whether every time stamp is that of a frame of the run."""
     if not len(frames):
         return False
     ordered = np.sort(frames.timestamps)
@@ -322,7 +322,7 @@ def _all_listed(trajectory: Trajectory, frames: FrameTable) -> bool:
 def _with_times(
     poses: Poses, path: Path, times: FloatArray | None, *, may_end_early: bool = False
 ) -> Poses:
-    """Give the rows of KITTI's format their times, if there are as many of them."""
+    """Give the rows in KITTI format their times, if the numbers are equal."""
     if poses.is_timed:
         return poses
     for known in (times, _times_beside(path)):
@@ -333,13 +333,13 @@ def _with_times(
 
 
 def ends_early(poses: Poses, times: FloatArray | None) -> bool:
-    """Whether only a few frames at the end of a sequence are without a true pose."""
+    """Return whether only a few frames at the end of a sequence have no true pose."""
     n = len(poses.trajectory)
     return times is not None and len(times) - _end(len(times)) <= n < len(times)
 
 
 def _end(n: int) -> int:
-    """How many frames at the end of a sequence may be without a true pose."""
+    """Return how many frames at the end of a sequence may have no true pose."""
     return max(1, int(_END * n))
 
 

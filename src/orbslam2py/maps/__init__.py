@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map outside of a running system: plain copies of it, and files of them."""
+"""Copies of maps outside a running system, and files of them."""
 
 from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
 from orbslam2py.maps.compare import map_differences

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What has changed in a growing map since the last look: for viewers and recorders."""
+"""Changes of a growing map since the last query: for viewers and recorders."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STRONG_EDGE = 100
 
 @dataclass(frozen=True, eq=False)
 class KeyframesSet:
-    """Keyframes that are new or have changed, as they are now."""
+    """New or changed keyframes, in their present state."""
 
     ids: IntArray
     """(k,) ascending."""
@@ -33,14 +33,14 @@ class KeyframesSet:
 
 @dataclass(frozen=True, eq=False)
 class PointsSet:
-    """Points that are new or have changed, as they are now."""
+    """New or changed points, in their present state."""
 
     ids: IntArray
     """(p,) ascending."""
     positions: FloatArray
     """(p, 3) world [m] (one camera: the map's own units)."""
     observation_counts: IntArray
-    """(p,) 2 per keyframe that sees the point with depth, 1 per keyframe without."""
+    """(p,) sum over the observing keyframes: 2 with depth, 1 without."""
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -48,33 +48,33 @@ class PointsSet:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MapChanges:
-    """What turns the map as it was at the last look into the map of one later moment.
+    """The changes from the map at the last query to the map at one later moment.
 
-    Who applies them in order (forget everything if `restarted`, then drop what was removed, then
-    take over what is set) has the published keyframes and all points of that moment. What is set
-    may also be as it was before.
+    Apply them in order: drop everything if `restarted`, drop the removed items, then store the
+    given ones. The result is the published keyframes and all points of that moment. The given items
+    may include unchanged ones.
     """
 
     map_index: int
-    """Which map it is, as in `TrackingRecord.map_index`."""
+    """Number of the map, as in `TrackingRecord.map_index`."""
     restarted: bool
-    """Everything seen before is void: the first look, or another map than before."""
+    """Earlier copies are invalid: this is the first query, or the map is another one."""
     keyframes_set: KeyframesSet
     """New, moved or otherwise changed keyframes."""
     keyframes_removed: IntArray
-    """(r,) ids, ascending, of keyframes that were given before."""
+    """(r,) ids, ascending, of removed keyframes that earlier queries gave."""
     points_set: PointsSet
     """New, moved or otherwise changed points."""
     points_removed: IntArray
-    """(q,) ids, ascending, of points that were given before."""
+    """(q,) ids, ascending, of removed points that earlier queries gave."""
     covisibility: IntArray | None
-    """(e, 2) all pairs of keyframes that share many points, the lower id first; None if the pairs
-    are as before."""
+    """(e, 2) all pairs of keyframes that share many points, the lower id first; None if
+    unchanged."""
     loop_edges: IntArray | None
-    """(l, 2) all pairs of keyframes that a closed loop connects, the lower id first; None if they
-    are as before."""
+    """(l, 2) all pairs of keyframes that a closed loop connects, the lower id first; None if
+    unchanged."""
     spanning_tree: IntArray | None
-    """(t, 2) all pairs of a keyframe and its parent, in this order; None if they are as before."""
+    """(t, 2) all pairs of a keyframe and its parent, in this order; None if unchanged."""
 
     def __bool__(self) -> bool:
         """Whether anything has changed."""
@@ -102,11 +102,11 @@ class MapChanges:
 
 
 class MapFollower:
-    """Tells at every look what has changed in a map since the look before.
+    """Returns the changes of a map since the last query.
 
-    A look costs what has changed, not what there is: a map of thousands of keyframes can be
-    followed several times a second. It is of one moment, does not keep tracking waiting, and may
-    be taken from any thread.
+    The cost of a query depends on the changes, not on the size of the map: maps of thousands of
+    keyframes can be queried several times a second. A query gives the state of one moment, does not
+    block tracking, and may come from any thread.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class MapFollower:
     least_weight
         Least number of shared points of two keyframes whose covisibility is reported.
     map_index
-        The map that is followed, if there are several; None: the active one, whichever that is.
+        Number of the map, if there are several; None: the active one at each query.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class MapFollower:
         Returns
         -------
         MapChanges
-            What has changed since the last call; in the first, everything.
+            The changes since the last call; everything in the first call.
         """
         changes = self._follower.update()
         keyframes, points = changes.keyframes_set, changes.points_set

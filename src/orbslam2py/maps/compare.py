@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether two saved maps hold the same, and if not, where they differ and by how much."""
+"""Whether two saved maps are equal, and otherwise where and by how much they differ."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from orbslam2py.maps.saved_map import SavedMap, saved_of
 
 
 def map_differences(first: SavedMap, second: SavedMap) -> list[str]:
-    """Compare what two files hold, bit by bit; names of files and programs do not count.
+    """Compare the contents of two map files bit by bit; names of files and programs are ignored.
 
     Returns
     -------
     list of str
-        One sentence per thing that differs; empty if nothing does.
+        One sentence for each difference; empty if there is none.
 
     Raises
     ------
     MapFileError
-        If one of them is no `SavedMap`, such as a path.
+        If one of them is not a `SavedMap`, for example a path.
     """
     saved_of(first, "the first map")
     saved_of(second, "the second map")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parts of a map as groups of arrays: keyframes, points, and who sees what.
+"""The parts of a map as groups of arrays: keyframes, points and observations.
 
-Ids ascend and are never reused in one map. ``T_ab`` maps coordinates of frame b into frame a; the
-world of a map is the camera frame of its root when it was made. Lengths are metres, with a single
+Ids ascend and are never reused in one map. ``T_ab`` maps coordinates of frame b into frame a. The
+world of a map is the first camera frame of its root keyframe. Lengths are metres, with a single
 camera the map's own unit. Pixels: the centre of the top-left pixel is (0, 0).
 """
 
@@ -36,7 +36,7 @@ WordArray = NDArray[np.uint32]
 
 
 class ArrayGroup:
-    """Arrays that belong together; compared by content."""
+    """Arrays of one group; compared by content."""
 
     def arrays(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """Names and arrays, in the order in which they are declared."""
@@ -46,7 +46,7 @@ class ArrayGroup:
 
 @dataclass(frozen=True, eq=False)
 class Cameras(ArrayGroup):
-    """The cameras that keyframes were seen with: (c,) entries each, one as a rule."""
+    """The cameras of the keyframes: (c,) entries each, usually one."""
 
     fx: FloatArray
     """Focal length [px]."""
@@ -55,7 +55,7 @@ class Cameras(ArrayGroup):
     """Principal point [px]."""
     cy: FloatArray
     distortion: FloatArray
-    """(c, 8): k1, k2, p1, p2, k3, k4, k5, k6; zeros when the images are rectified."""
+    """(c, 8): k1, k2, p1, p2, k3, k4, k5, k6; zeros if the images are rectified."""
     bf: FloatArray
     """Baseline times fx [px m]; 0 with a single camera."""
     depth_ratio: FloatArray
@@ -64,10 +64,10 @@ class Cameras(ArrayGroup):
     """Of the images [px]."""
     height: IntArray
     scale_factor: Float32Array
-    """Between the levels of the image pyramid."""
+    """Factor between the levels of the image pyramid."""
     n_levels: IntArray
     model: IntArray
-    """Of a fisheye lens the place of its camera model in the list of models, from 1 on; 0 of a
+    """For a fisheye lens the number of its camera model in the list of models, from 1; 0 for a
     pinhole. `camera_model` gives the model itself."""
     lens: FloatArray
     """(c, 16) parameters of that model, zeros after the last one."""
@@ -121,9 +121,9 @@ class Keyframes(ArrayGroup):
     """
 
     ids: IntArray
-    """(k,) ascending; those without a parent are the roots of maps, one as a rule: keyframe 0."""
+    """(k,) ascending; keyframes without a parent are the roots of maps, usually only keyframe 0."""
     frame_ids: IntArray
-    """(k,) number of the image that became the keyframe, in the run that made it."""
+    """(k,) number of the image that became the keyframe, in its run."""
     timestamps: FloatArray
     """(k,) seconds."""
     camera: IntArray
@@ -133,21 +133,21 @@ class Keyframes(ArrayGroup):
     translations: FloatArray
     """(k, 3) of `T_cw`: the world's origin in the camera."""
     scale: FloatArray
-    """(k,) by how much lengths around the keyframe have been multiplied since it was made."""
+    """(k,) factor by which lengths around the keyframe have been multiplied since its creation."""
     parent: IntArray
     """(k,) ids in the spanning tree, -1 for the root of a map."""
     provisional_parent: BoolArray
-    """(k,) the parent is the keyframe before, for want of a neighbour."""
+    """(k,) whether the parent is the previous keyframe, because there was no neighbour."""
     processed: BoolArray
-    """(k,) local mapping has taken it in."""
+    """(k,) whether local mapping has processed it."""
     has_colours: BoolArray
     """(k,) `colours` are known."""
     offsets: IntArray
-    """(k + 1,) into the arrays below."""
+    """(k + 1,) offsets into the arrays below."""
     keypoints: Float32Array
     """(n, 2) undistorted pixels x, y."""
     raw_keypoints: Float32Array
-    """(n, 2) pixels of the images as given; (0, 2) when no camera's lens distorts."""
+    """(n, 2) pixels of the images as given; (0, 2) if no camera has distortion."""
     octave: ByteArray
     """(n,) level of the image pyramid."""
     angle: Float32Array
@@ -157,14 +157,14 @@ class Keyframes(ArrayGroup):
     descriptors: ByteArray
     """(n, 32) ORB."""
     depth: Float32Array
-    """(n,) along the optical axis [m]; -1 unknown."""
+    """(n,) depth along the optical axis [m]; -1 if unknown."""
     right_u: Float32Array
-    """(n,) column in the (virtual) right image [px]; -1 where the depth is unknown."""
+    """(n,) column in the (virtual) right image [px]; -1 if the depth is unknown."""
     colours: ByteArray
-    """(n, 3) RGB of the image there, 0 where unknown; (0, 3) when no keyframe has any."""
+    """(n, 3) RGB of the image at the keypoint, 0 if unknown; (0, 3) if no keyframe has colours."""
     words: WordArray = dataclasses.field(default_factory=lambda: np.zeros(0, np.uint32))
-    """(n,) visual word of the descriptor, 2^32 - 1 where it is stopped; (0,) when not known. It
-    follows from the descriptor and the vocabulary."""
+    """(n,) visual word of the descriptor, 2^32 - 1 for a stopped word; (0,) if not known.
+    Descriptor and vocabulary determine it."""
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -180,7 +180,7 @@ class Keyframes(ArrayGroup):
         return inverse_poses(self.T_cw)
 
     def with_poses(self, T_cw: FloatArray) -> Keyframes:
-        """Return the same keyframes at other poses.
+        """Return the same keyframes with other poses.
 
         Parameters
         ----------
@@ -204,7 +204,7 @@ class Keyframes(ArrayGroup):
         return _row_of(self.ids, keyframe_id, "keyframe")
 
     def keypoints_of(self, row: int) -> slice:
-        """Return where the keypoints of the keyframe in this row are."""
+        """Return the range of the keypoints of the keyframe in this row."""
         return slice(int(self.offsets[row]), int(self.offsets[row + 1]))
 
 
@@ -218,21 +218,21 @@ class Points(ArrayGroup):
     mean_directions: FloatArray
     """(p, 3) mean of the unit vectors from the observing cameras to the point; length <= 1."""
     min_distance: FloatArray
-    """(p,) from which the point would appear on the coarsest level of the pyramid."""
+    """(p,) distance at which the point would appear on the coarsest level of the pyramid."""
     max_distance: FloatArray
-    """(p,) from which it would appear on the finest."""
+    """(p,) distance at which it would appear on the finest level."""
     descriptors: ByteArray
-    """(p, 32) the representative one of those observed."""
+    """(p, 32) the most representative descriptor of its observations."""
     n_visible: Int32Array
-    """(p,) frames in whose view the point lay."""
+    """(p,) number of frames in whose view the point was."""
     n_found: Int32Array
-    """(p,) of these, frames that matched it."""
+    """(p,) number of these frames that matched it."""
     reference_keyframe: IntArray
-    """(p,) id of the observer that gives the distances."""
+    """(p,) id of the observing keyframe that determines the distances."""
     first_keyframe: IntArray
-    """(p,) id of the keyframe that made it, which may have been removed since."""
+    """(p,) id of the keyframe that created it, which may have been removed."""
     first_frame: IntArray
-    """(p,) number of that image in the run that made it."""
+    """(p,) number of the image of this keyframe, in its run."""
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -240,7 +240,7 @@ class Points(ArrayGroup):
 
 @dataclass(frozen=True, eq=False)
 class Observations(ArrayGroup):
-    """Who sees what: (o,) entries each, by ascending (point, keyframe)."""
+    """Observations: (o,) entries each, by ascending (point, keyframe)."""
 
     point: IntArray
     """(o,) ids."""
@@ -262,7 +262,7 @@ class Covisibility(ArrayGroup):
     b: IntArray
     """(e,) ids."""
     weight: Int32Array
-    """(e,) shared points, as last counted; at least 1."""
+    """(e,) number of shared points at the last count; at least 1."""
 
     def __len__(self) -> int:
         return len(self.a)
@@ -270,18 +270,18 @@ class Covisibility(ArrayGroup):
 
 @dataclass(frozen=True, eq=False)
 class RemovedKeyframes(ArrayGroup):
-    """Where culled keyframes were, relative to others: frames tracked in them hang on that."""
+    """Poses of culled keyframes relative to others, for the frames that refer to them."""
 
     ids: IntArray
     """(r,) ascending."""
     parent: IntArray
-    """(r,) ids of keyframes that live or were removed later."""
+    """(r,) ids of the parents: living keyframes, or ones that were removed later."""
     rotations: FloatArray
     """(r, 4) unit quaternions x, y, z, w of the parent's camera to the keyframe's."""
     translations: FloatArray
     """(r, 3) of the same transform."""
     scale: FloatArray
-    """(r,) `Keyframes.scale` at that time."""
+    """(r,) `Keyframes.scale` at the removal."""
     parent_scale: FloatArray
     """(r,) the same of the parent."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Everything that a map is, as arrays: what map files, exports and edits of a map work on."""
+"""All data of a map as arrays, for map files, exports and edits."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _WORDS = "keyframes.words"
 
 @dataclass(frozen=True, eq=False)
 class MapContents:
-    """Everything that a map is, of one moment; arrays are not to be changed.
+    """All data of a map at one moment; the arrays must not be changed.
 
-    Exports and edits take it, and refuse a `SavedMap`: give its ``contents``.
+    Exports and edits take it. They refuse a `SavedMap`: pass its ``contents``.
 
     Examples
     --------
@@ -44,9 +44,9 @@ class MapContents:
     """
 
     map_index: int
-    """Which map of the system it is, from 0."""
+    """Number of the map in the system, from 0."""
     next_keyframe: int
-    """Id of the next keyframe; those before it that are not in `keyframes` have been removed."""
+    """Id of the next keyframe; lower ids that are not in `keyframes` have been removed."""
     next_point: int
     """Id of the next point."""
     cameras: Cameras
@@ -56,29 +56,31 @@ class MapContents:
     observations: Observations
     covisibility: Covisibility
     loop_edges: IntArray
-    """(l, 2) ids of keyframes that a closed loop connects, ascending, the lower one first."""
+    """(l, 2) ids of keyframes that a closed loop connects, ascending, the lower id first."""
     metric_roots: tuple[int, ...] = ()
-    """First keyframes of those maps of a single camera that were given metres, ascending
-    (`transform_map`, ``map align``); a camera that sees metres needs no telling."""
+    """First keyframes of single-camera maps whose unit was set to metres, ascending
+    (`transform_map`, ``map align``); maps of stereo and RGB-D cameras are not listed."""
 
     def observations_of_point(self, point_id: int) -> tuple[IntArray, Int32Array]:
-        """Return who sees a point.
+        """Return the observations of a point.
 
         Returns
         -------
         keyframes, keypoints
-            Ids (m,), and numbers of the keypoints there (m,); empty for an unknown point.
+            Ids of keyframes (m,), and numbers of the keypoints in them (m,); empty for an unknown
+            point.
         """
         first, last = np.searchsorted(self.observations.point, [point_id, point_id + 1])
         return self.observations.keyframe[first:last], self.observations.keypoint[first:last]
 
     def observations_in_keyframe(self, keyframe_id: int) -> tuple[IntArray, Int32Array]:
-        """Return what a keyframe sees.
+        """Return the observations of a keyframe.
 
         Returns
         -------
         points, keypoints
-            Ids (m,) ascending, and numbers of the keypoints (m,); empty for an unknown keyframe.
+            Ids of points (m,) ascending, and numbers of the keypoints (m,); empty for an unknown
+            keyframe.
         """
         order, keyframes = self._by_keyframe
         first, last = np.searchsorted(keyframes, [keyframe_id, keyframe_id + 1])
@@ -97,13 +99,12 @@ class MapContents:
         return self.keyframes.offsets[rows] + self.observations.keypoint
 
     def point_colours(self) -> ByteArray | None:
-        """Return the points' colours, each the mean of what its keyframes see.
+        """Return the colours of the points, each the mean over its observations.
 
         Returns
         -------
         array of uint8 (p, 3) or None
-            RGB; mid grey for a point of which no keyframe knows a colour. None when no keyframe
-            has colours.
+            RGB; mid grey for a point without any colour. None if no keyframe has colours.
         """
         if not len(self.keyframes.colours):
             return None
@@ -129,7 +130,7 @@ class MapContents:
                 yield field.name, value
 
     def as_dict(self) -> dict[str, Any]:
-        """All arrays and numbers by name, as the C++ core takes them."""
+        """All arrays and numbers by name, for the C++ core."""
         numbers = {
             "map_index": self.map_index,
             "next_keyframe": self.next_keyframe,
@@ -140,8 +141,8 @@ class MapContents:
     def first_difference(self, other: MapContents) -> str | None:
         """Name the first array in which two maps differ, bit by bit; None if they are equal.
 
-        `map_index` says which map of a run it was, not what is in it, and is not compared. Words
-        are, if both know them.
+        `map_index` is the number of the map in a run, not content, and is not compared. Words are
+        compared if both maps have them.
         """
         for name in ("next_keyframe", "next_point", "metric_roots"):
             if getattr(self, name) != getattr(other, name):
@@ -156,7 +157,7 @@ class MapContents:
         return None
 
     def content_hash(self) -> str:
-        """SHA-256 over everything but `map_index` and words: equal for equal maps, bit by bit."""
+        """SHA-256 over all but `map_index` and words: equal for maps that are equal bit by bit."""
         digest = hashlib.sha256(f"{self.next_keyframe} {self.next_point}".encode())
         for name, array in self.arrays():
             if name == _WORDS:
@@ -169,12 +170,12 @@ class MapContents:
 
 
 def contents_of(value: Any) -> MapContents:
-    """Take the contents of a map.
+    """Check that an object is the contents of a map.
 
     Raises
     ------
     MapFileError
-        For anything else, also for a `SavedMap`, which has them.
+        For any other object, also for a `SavedMap`, which has contents.
     """
     remedy = "its MapContents: saved.contents of saved = load_map(path)"
     return instance_of(value, MapContents, "the map", remedy, MapFileError)

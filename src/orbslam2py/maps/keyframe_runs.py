@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which run made which keyframe of a map, and how far the camera went in each."""
+"""The run of each keyframe of a map, and the distance of the camera in each run."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from orbslam2py.maps.saved_map import SavedMap
 
 
 def runs_of_keyframes(saved: SavedMap) -> IntArray:
-    """Number of the run that made each keyframe, int64 (k,); 0 for all if nothing tells.
+    """Number of the run of each keyframe, int64 (k,); 0 for all if it is not known.
 
-    That is the first run with a frame of the keyframe's time that hangs on it: a later one may have
-    found itself there at an equal time. A keyframe without such a frame counts to the run of the
-    one before it, since ids ascend from run to run.
+    It is the first run with a frame of this time and keyframe: a later run may have found itself
+    there at an equal time. A keyframe without such a frame gets the run of the previous one,
+    because ids ascend from run to run.
     """
     keyframes = saved.contents.keyframes
     k = len(keyframes)
@@ -34,14 +34,14 @@ def runs_of_keyframes(saved: SavedMap) -> IntArray:
 
 
 def way_along(saved: SavedMap, chosen: BoolArray) -> float:
-    """Length of the way from keyframe to keyframe; nothing leads from one run to the next.
+    """Length of the path from keyframe to keyframe, without the gaps between runs.
 
     Parameters
     ----------
     saved
         The map or maps.
     chosen
-        Which keyframes, bool (k,): those of one map.
+        Mask of the keyframes of one map, bool (k,).
     """
     positions = saved.contents.keyframes.T_wc[chosen, :3, 3]
     same_run = np.diff(runs_of_keyframes(saved)[chosen]) == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is drawn of a map, as a small file of arrays: map.npz in the folder of a run."""
+"""The drawn parts of a map as a small file of arrays: map.npz in the folder of a run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FORMAT = 1
 
 @dataclass(frozen=True, eq=False)
 class MapArrays:
-    """Keyframes, points and edges of a map; enough to draw it, not to go on with it."""
+    """Keyframes, points and edges of a map; enough to draw it, but not to continue it."""
 
     keyframe_ids: IntArray
     """(k,) ascending."""
@@ -47,14 +47,14 @@ class MapArrays:
 
     @classmethod
     def of(cls, slam_map: core.Map, map_index: int | None = None) -> MapArrays:
-        """Copy what is drawn of a map that is at rest; the world is its first keyframe.
+        """Copy the drawn parts of a map at rest, in the frame of its first keyframe.
 
         Parameters
         ----------
         slam_map
             The map or maps.
         map_index
-            Which; the active one if None.
+            Number of the map; None: the active one.
         """
         changes = MapFollower(slam_map, map_index=map_index).update()
         seen = core.snapshot_observations(slam_map, -1 if map_index is None else map_index)
@@ -94,7 +94,7 @@ class MapArrays:
         Raises
         ------
         MapFileError
-            If the path is none.
+            If the path is invalid.
         OSError
             If it cannot be written.
         """
@@ -111,7 +111,7 @@ class MapArrays:
         Raises
         ------
         MapFileError
-            Naming the file, if it is no such file or not whole.
+            If it is no such file or is incomplete; the message names the file.
         OSError
             If it cannot be read.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeping the map of a running system in files, at any moment or all the time."""
+"""Saving the map of a running system, once or at intervals."""
 
 from __future__ import annotations
 
@@ -44,26 +44,26 @@ Recorded = Callable[[int, IntArray], RecordedFrames]
 
 
 class MapAutosave:
-    """Writes the map of a system, with all that must be known to use it.
+    """Writes the map of a system, with all that is needed to use it.
 
-    May be used from any thread, while images are tracked.
+    May be called from any thread, also during tracking.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     recorded : callable
-        Gives the frames that a file is to hold.
+        Gives the frames for a file.
     settings : Settings
         Of the camera.
     vocabulary : callable
-        Tells which visual words there are: only who saves needs to know.
+        Gives the vocabulary, which only saving needs.
     seed : int
         Of the present run.
     options : mapping
-        Those of the system, by their names.
+        Options of the system, by name.
     earlier : SavedMap or MapFile, optional
-        What the map was loaded from.
+        The file that the map was loaded from.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class MapAutosave:
         self._autosave: _Autosave | None = None
 
     def keep_image(self, keyframe: int, jpeg: bytes) -> None:
-        """Remember the image of a keyframe of the present map."""
+        """Keep the image of a keyframe of the present map."""
         with self._images_lock:
             if self._map.epoch != self._images_of:
                 self._images, self._images_of = {}, self._map.epoch
@@ -102,7 +102,7 @@ class MapAutosave:
                 self._drop_images(set())
 
     def _images_in(self, contents: MapContents) -> dict[int, bytes]:
-        """Images of the keyframes of a map, by ascending ids; those of dead ones are forgotten."""
+        """Return the images of the keyframes of a map, by id; drop those of culled ones."""
         with self._images_lock:
             if contents.map_index != self._images_of or not self._images:
                 return {}
@@ -111,7 +111,7 @@ class MapAutosave:
             return {number: self._images[number] for number in ids if number in self._images}
 
     def _drop_images(self, but: set[int]) -> None:
-        """Forget the images of keyframes that have gone, but for some; the lock is held."""
+        """Drop the images of culled keyframes, except some; the caller holds the lock."""
         # Those of keyframes that wait for mapping stay, which contents do not have yet.
         wanted = but | set(self._map.keyframe_ids().tolist())
         self._images = {k: jpeg for k, jpeg in self._images.items() if k in wanted}
@@ -119,7 +119,7 @@ class MapAutosave:
 
     # ---- whole files -----------------------------------------------------------------------------
     def saved_map(self) -> SavedMap:
-        """Everything that a map file holds, of this moment."""
+        """Return all that a map file contains, at this moment."""
         contents = take_contents(self._map)
         runs = (*self._runs_before(contents), self._present_run(contents))
         images = self._images_in(contents)
@@ -153,13 +153,13 @@ class MapAutosave:
 
     @property
     def is_saving_here(self) -> bool:
-        """Whether this very thread is the one that saves by itself."""
+        """Return whether the caller is the thread of the autosave."""
         return self._autosave is not None and self._autosave.is_here
 
     def stop_autosave(self) -> None:
-        """Save a last time and end; raises `MapFileError` if that does not work.
+        """Save a last time and stop; raises `MapFileError` if that fails.
 
-        Should a Ctrl-C come before, it can be called again, and saves then.
+        After a Ctrl-C, a further call saves again.
         """
         if self._autosave is None:
             return
@@ -171,14 +171,14 @@ class MapAutosave:
         self._autosave = None
 
     def changes(self, writer: MapWriter, before: ChangedContents | None) -> ChangedContents:
-        """Copy what a file lacks of the map of this moment, which may be another one than it holds.
+        """Copy what a file lacks of the present map, which may differ from the map of the file.
 
         Parameters
         ----------
         writer : MapWriter
             Of the file.
         before : ChangedContents, optional
-            What the file holds: only what has changed since is looked at. None: everything.
+            The state of the file: only later changes are examined. None: everything.
         """
         known = np.array(sorted(key[0] for key in writer.keys("keypoints")), np.int64)
         return take_changes(self._map, known, before)
@@ -186,18 +186,18 @@ class MapAutosave:
     def update(
         self, writer: MapWriter, changes: ChangedContents, *, partly: bool, gently: bool = False
     ) -> bool:
-        """Bring a file up to date; False as long as there is no map that could be saved.
+        """Update a file; return False if there is no map to save yet.
 
         Parameters
         ----------
         writer : MapWriter
             Of the file.
         changes : ChangedContents
-            What the file lacks, from `changes`; of the map that it holds.
+            What the file lacks of its map, from `changes`.
         partly : bool
-            Only what has changed was looked at.
+            Whether only the changes were examined.
         gently : bool
-            Leave time to other threads all the while.
+            Release the lock for other threads regularly.
         """
         contents = changes.contents
         if gently:
@@ -241,9 +241,9 @@ class MapAutosave:
 
 
 class _Autosave:
-    """Saves at a fixed interval in a thread of its own; a failure is logged and tried again.
+    """Saves at a fixed interval in a separate thread; repeats failed saves, with a log entry.
 
-    A new map after a reset goes into a file of its own: the old one's stays as it is.
+    A new map after a reset gets a separate file; the file of the old one does not change.
     """
 
     def __init__(self, keeper: MapAutosave, path: str | os.PathLike[str], every: float) -> None:
@@ -260,12 +260,12 @@ class _Autosave:
         self._thread.start()
 
     def writes(self, path: Path) -> bool:
-        """Whether a file is the one that was asked for, or that of the present map."""
+        """Return whether a file is the requested one, or that of the present map."""
         return os.path.realpath(path) in (os.path.realpath(self.path), str(self._writer.path))
 
     @property
     def is_here(self) -> bool:
-        """Whether this very thread is the one that saves."""
+        """Return whether the caller is the thread that saves."""
         return threading.current_thread() is self._thread
 
     def save_now(self, *, everything: bool = True) -> None:
@@ -283,7 +283,7 @@ class _Autosave:
             self._held = changes if is_there else None
 
     def finish(self) -> None:
-        """Commit a last time and end the thread; may be repeated after a Ctrl-C."""
+        """Commit a last time and end the thread; may be called again after a Ctrl-C."""
         self._stop.set()
         self._thread.join()
         try:
@@ -309,7 +309,7 @@ class _Autosave:
                 _log.debug("in full:", exc_info=error)
 
     def _follow_reset(self, map_index: int) -> None:
-        """Give another map a file of its own, if there is something in the present one."""
+        """Give another map a separate file, if the present one is not empty."""
         old = self._writer
         if old.begun:
             path = self.path.with_stem(f"{self.path.stem}-{map_index - self._first_map}")
@@ -328,9 +328,10 @@ class _Autosave:
 
 
 def _leaving_time(rows: Iterable[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
-    """Give the interpreter's lock to whoever waits for it, every fraction of a millisecond.
+    """Release the interpreter's lock several times in a millisecond.
 
-    A thread that only asks for the lock gets it after five milliseconds, which a frame would feel.
+    Otherwise a waiting thread gets the lock only after five milliseconds, which would delay a
+    frame.
     """
     since = time.perf_counter()
     for row in rows:
@@ -348,9 +349,9 @@ def encode_image(image: npt.NDArray[np.uint8], width: int = 320, quality: int = 
     image : array of uint8, (h, w) or (h, w, c)
         Grey or colour.
     width : int
-        Of the JPEG at most, in pixels.
+        Largest width and height of the JPEG, in pixels.
     quality : int
-        Of the JPEG, 0 to 100.
+        JPEG quality, 0 to 100.
     """
     import cv2  # noqa: PLC0415 - only those who keep images need it
 

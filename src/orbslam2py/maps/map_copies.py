@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Copies of a map of the core, whole or of what has changed, and maps made of copies."""
+"""Copies of a map of the core, complete or of its changes, and maps made of copies."""
 
 from __future__ import annotations
 
@@ -30,26 +30,26 @@ _metric_roots: weakref.WeakKeyDictionary[core.Map, tuple[int, tuple[int, ...]]] 
 
 @dataclass(frozen=True, eq=False)
 class ChangedContents:
-    """What may have changed in a map since an earlier copy of it, for who keeps a file of it."""
+    """Possible changes of a map since an earlier copy, to update a file."""
 
     contents: MapContents
-    """All but the keypoints that were known, and the points on pages without a change."""
+    """All but known keypoints and the points on unchanged pages."""
     keyframe_stamp: int
-    """Of the last change of a keyframe ..."""
+    """Number of the last change of a keyframe ..."""
     point_stamp: int
     """... and of a point."""
     changed_keyframes: BoolArray
-    """(k,) pose, parent, weights or something else has changed."""
+    """(k,) whether pose, parent, weights or other fields have changed."""
     pages: IntArray
-    """(m,) of `IDS_PER_PAGE` ids each: points on other pages have not changed."""
+    """(m,) numbers of pages of `IDS_PER_PAGE` ids: points on other pages have not changed."""
     incomplete_pages: IntArray
-    """(i,) of these, those with points whose keyframes mapping has not taken in yet."""
+    """(i,) pages among them with points whose keyframes local mapping has not processed yet."""
 
 
 def take_contents(slam_map: core.Map) -> MapContents:
-    """Copy everything of a map, as of one moment, while the system may be running.
+    """Copy a whole map at one moment; the system may be running.
 
-    Keyframes that local mapping has not taken in yet, and what only they see, are not part of it.
+    Keyframes that local mapping has not processed yet, and points that only they see, are left out.
 
     Parameters
     ----------
@@ -62,16 +62,16 @@ def take_contents(slam_map: core.Map) -> MapContents:
 def take_changes(
     slam_map: core.Map, known_keyframes: IntArray, before: ChangedContents | None
 ) -> ChangedContents:
-    """Copy what may have changed in a map since an earlier copy, but for the tracker's counters.
+    """Copy possible changes of a map since an earlier copy, without the counters of tracking.
 
     Parameters
     ----------
     slam_map
         The map.
     known_keyframes
-        Ids (m,), ascending, of keyframes whose keypoints, which never change, are left out.
+        Ids (m,), ascending, of keyframes whose keypoints are left out, because they never change.
     before
-        The earlier copy, of the same map (`MapContents.map_index`); None: there is none.
+        The earlier copy of the same map (`MapContents.map_index`); None if there is none.
     """
     since: dict[str, Any] = {}
     if before is not None:
@@ -113,20 +113,20 @@ def restore_contents(
     Parameters
     ----------
     contents
-        Everything that the map is.
+        All data of the map.
     slam_map
         An empty map to fill; a new one by default.
     vocabulary
-        Describes the keyframes by words, which recognising places needs.
+        Vocabulary for the words of the keyframes, for place recognition.
     index
-        Gets the keyframes, once they are described.
+        Gets the keyframes with their words.
     words_fit
-        The words that the contents know are of this vocabulary and need not be searched again.
+        The words in the contents are of this vocabulary and need not be computed again.
 
     Raises
     ------
     MapFileError
-        If the contents are impossible; names the thing. Nothing was changed then.
+        If the contents are inconsistent; the message says where. Nothing was changed then.
     """
     contents_of(contents)
     if slam_map is None:
@@ -141,12 +141,12 @@ def restore_contents(
 
 
 def remember_metric_roots(slam_map: core.Map, roots: tuple[int, ...]) -> None:
-    """Keep beside a map of the core which of its maps were given metres, for copies of it.
+    """Store for a map of the core which of its maps are in metres, for copies of it.
 
     Parameters
     ----------
     slam_map
-        The map, as it was just made.
+        The map, just created.
     roots
         As in `MapContents.metric_roots`.
     """
@@ -155,6 +155,6 @@ def remember_metric_roots(slam_map: core.Map, roots: tuple[int, ...]) -> None:
 
 
 def living_roots(roots: tuple[int, ...], keyframes: Keyframes) -> tuple[int, ...]:
-    """Take those that are roots: a map that became part of another one has the other's unit."""
+    """Keep only the roots: a merged map has the unit of the other one."""
     there = keyframes.ids[keyframes.parent < 0]
     return tuple(there[np.isin(there, np.array(roots, np.int64))].tolist())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Map files: maps that outlive the program. The format: ``docs/reference/map_file.md``."""
+"""Map files: maps that remain after the program. The format: ``docs/reference/map_file.md``."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from orbslam2py.settings.sensor import Sensor
 
 
 class MapFile:
-    """A map file that a system can begin in, without the copy of it that `load_map` makes.
+    """A map file that a system can begin in, without the copy that `load_map` makes.
 
-    What must be known to use the map is read at once, the map itself when a system is made.
+    The description of the map is read at once, the map itself when a system is created.
 
     Parameters
     ----------
     path
-        The file. It is not changed; another program may be writing it.
+        The file. The file; it is only read, and another program may write it.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class MapFile:
     Raises
     ------
     MapFileError
-        Naming the file, what is wrong and what can be done about it.
+        The message names the file, the fault and a remedy.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -65,7 +65,7 @@ class MapFile:
         return self.settings.sensor
 
     def check(self) -> None:
-        """Read the file once without making anything of it: whether it is whole.
+        """Read the whole file once as a check, without building the map.
 
         Raises
         ------
@@ -92,15 +92,15 @@ class MapFile:
         slam_map
             An empty map to fill.
         vocabulary
-            Describes the keyframes by words: those in the file, if it is the one that the map was
-            made with.
+            Vocabulary for the words of the keyframes; words in the file are used if they are of
+            this vocabulary.
         index
-            Gets the keyframes, once they are described.
+            Gets the keyframes with their words.
 
         Raises
         ------
         MapFileError
-            If the file is damaged, or another one than when it was opened; nothing was changed
+            If the file is damaged or has been replaced since it was opened; nothing is changed
             then.
         """
         with self._opened() as stored:
@@ -125,20 +125,20 @@ class MapFile:
 
 
 def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
-    """Write a map file; it appears under its name when all of it has been written.
+    """Write a map file; it gets its name only after it is complete.
 
     Parameters
     ----------
     saved
-        The map, and what must be known to use it.
+        The map, with all that is needed to use it.
     path
-        The file, by custom with the suffix ``.orbmap``; a map that is there is replaced.
+        The file, by custom with the suffix ``.orbmap``; an existing map is replaced.
 
     Raises
     ------
     MapFileError
-        If the map has no keyframes, it is one that `load_map` would refuse, the file cannot be
-        written, or it is there and is no map; a file that was there is kept.
+        If the map has no keyframes or `load_map` would refuse it, if the file cannot be written, or
+        if it exists and is no map; an existing file is kept.
     """
     contents_of(saved_of(saved).contents)
     path = path_of(path, "the map file", MapFileError)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading map files: nothing in them is trusted."""
+"""Reading of map files, with checks of all contents."""
 
 from __future__ import annotations
 
@@ -52,20 +52,20 @@ _ID = re.compile(r"[0-9]{1,18}")
 def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
     """Read a map file.
 
-    Everything is checked: checksums, counts, sizes, references, ranges. What is returned can be
-    used.
+    Checks cover checksums, counts, sizes, references and ranges. The result can be used without
+    further checks.
 
     Parameters
     ----------
     path
-        The file. It is not changed; another program may be writing it.
+        The file. The file; it is only read, and another program may write it.
     images
-        Also read the keyframes' images.
+        Whether to read the images of the keyframes too.
 
     Raises
     ------
     MapFileError
-        Naming the file, what is wrong and what can be done about it.
+        The message names the file, the fault and a remedy.
     """
     named = str(path)
     with opened(path) as (connection, tables):
@@ -80,17 +80,17 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
 def opened(
     path: str | os.PathLike[str],
 ) -> Iterator[tuple[sqlite3.Connection, dict[str, Table]]]:
-    """Open a map file for reading, all of it as of one commit.
+    """Open a map file for reading, in the state of one commit.
 
     Yields
     ------
     connection, tables
-        To the database, and the tables that it has.
+        The connection to the database, and its tables.
 
     Raises
     ------
     MapFileError
-        Naming the file; also for what is found to be wrong with it while it is open.
+        The message names the file; also for faults found while it is open.
     """
     file = path_of(path, "the map file", MapFileError)
     named = str(path)
@@ -108,7 +108,7 @@ def opened(
 
 
 def _check_header(path: Path, named: str) -> int:
-    """Tell what a file is by its first bytes, before SQLite looks at it; returns its version."""
+    """Check a file by its first bytes before SQLite reads it; return its version."""
     try:
         if path.is_dir():
             raise MapFileError(f"{named} is a folder; give the map file itself")
@@ -143,7 +143,7 @@ def _check_header(path: Path, named: str) -> int:
 
 @contextlib.contextmanager
 def _refusing(named: str) -> Iterator[None]:
-    """Say which file is wrong, and what to do."""
+    """Make an error that names the file, the fault and a remedy."""
     try:
         yield
     except MapFileError as error:
@@ -159,7 +159,7 @@ def _refusing(named: str) -> Iterator[None]:
 
 
 def _one_line(error: Exception) -> str:
-    """What an error says, however much of a damaged file it quotes."""
+    """Return the text of an error, shortened if it quotes a damaged file."""
     text = " ".join(str(error).split())
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
@@ -173,18 +173,18 @@ def _check_schema(connection: sqlite3.Connection, version: int) -> None:
 
 
 class Head(NamedTuple):
-    """What must be known to use a map, as in `SavedMap`."""
+    """The description of a map, as in `SavedMap`."""
 
     settings: Settings
     vocabulary: VocabularyIdentity
     runs: tuple[Run, ...]
     images: dict[int, bytes]
     metric_roots: tuple[int, ...]
-    """As in `MapContents`; it is for who has the keyframes to see that they are roots."""
+    """As in `MapContents`; the caller checks that they are roots."""
 
 
 def read_head(connection: sqlite3.Connection, tables: dict[str, Table], *, images: bool) -> Head:
-    """Everything but the map itself."""
+    """Return all but the map itself."""
     sensor, yaml = read_one(connection, tables["settings"])[1:]
     if sensor not in {member.value for member in Sensor}:
         raise MapFileError(f"it names a sensor that is not known, '{sensor}'")
@@ -230,7 +230,7 @@ def _read_runs(connection: sqlite3.Connection, tables: dict[str, Table]) -> Iter
 
 
 def check_contents(contents: MapContents, runs: tuple[Run, ...]) -> None:
-    """Raise `MapFileError`, naming the thing, unless this can be a map with its runs."""
+    """Raise `MapFileError` with the fault, unless this can be a map with its runs."""
     core.check_map_contents(contents.as_dict())
     check_frames(runs, contents.keyframes.ids, contents.removed_keyframes.ids)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A map as the rows of a map file's tables, and their checksums."""
+"""The rows of a map file's tables, and their checksums."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Row = tuple[Any, ...]
 
 
 def checksum(row: Row) -> int:
-    """CRC-32 over the values of a row: a letter for the type of each, its length, its bytes."""
+    """CRC-32 over the values of a row: for each a letter for its type, its length, its bytes."""
     crc = 0
     for value in row:
         if isinstance(value, int):
@@ -52,7 +52,7 @@ def checksum(row: Row) -> int:
 def settings_rows(
     settings: Settings, vocabulary: VocabularyIdentity, metric_roots: tuple[int, ...] = ()
 ) -> Iterator[tuple[str, Row]]:
-    """Camera and visual words, as (table, row), and which maps were given metres."""
+    """Camera and vocabulary, as (table, row), and which maps are in metres."""
     yaml = settings.to_yaml()
     if metric_roots:
         yaml += f"{IN_METRES} {' '.join(map(str, metric_roots))}\n"
@@ -61,7 +61,7 @@ def settings_rows(
 
 
 def run_rows(number: int, run: Run, *, first_part: int = 0) -> Iterator[tuple[str, Row]]:
-    """Row a run, as (table, row), and its frames from a part on."""
+    """One row for each run, as (table, row), and its frames from a part on."""
     options = json.dumps(dict(run.options), sort_keys=True)
     yield "runs", (number, run.program, run.started, run.seed, options)
     for part in range(first_part, -(-len(run.frames) // FRAMES_PER_ROW)):
@@ -74,14 +74,14 @@ def run_rows(number: int, run: Run, *, first_part: int = 0) -> Iterator[tuple[st
 def map_rows(
     contents: MapContents, changed_keyframes: NDArray[np.bool_] | None = None
 ) -> Iterator[tuple[str, Row]]:
-    """Everything of the map but the keyframes' keypoints, as (table, row).
+    """All of the map but the keypoints of keyframes, as (table, row).
 
     Parameters
     ----------
     contents
         The map.
     changed_keyframes
-        (k,) which keyframes' rows are wanted; all by default.
+        (k,) mask of the keyframes; all by default.
     """
     if changed_keyframes is None:
         changed_keyframes = np.ones(len(contents.keyframes), bool)
@@ -104,14 +104,14 @@ def map_rows(
 def keypoint_rows(
     contents: MapContents, wanted: Iterable[int] | None = None
 ) -> Iterator[tuple[str, Row]]:
-    """Row by row the keypoints of keyframes, as (table, row).
+    """Keypoints of keyframes row by row, as (table, row).
 
     Parameters
     ----------
     contents
         The map.
     wanted
-        Which rows of the keyframes; all by default.
+        Rows of the keyframes; all by default.
     """
     keyframes = contents.keyframes
     for row in range(len(keyframes)) if wanted is None else wanted:
@@ -201,7 +201,7 @@ def _page_rows(name: str, group: object, ids: IntArray) -> Iterator[tuple[str, R
 
 
 def _groups(keys: IntArray) -> Iterator[tuple[int, slice]]:
-    """The runs of equal values in ascending keys."""
+    """Return the ranges of equal values in ascending keys."""
     if not len(keys):
         return
     begins = np.flatnonzero(np.diff(keys, prepend=keys[0] - 1))

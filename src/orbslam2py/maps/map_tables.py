@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of a map file to arrays; rows are checked against their checksums.
+"""Arrays from the tables of a map file; rows are checked by their checksums.
 
-Sizes are known and checked before anything is made for them, and rows are read one by one, so that
-reading needs no more memory than what is read.
+Sizes are checked before memory is allocated. Rows are read one by one, so that reading needs no
+more memory than the result.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ _PART = 64
 
 
 def each_row(connection: sqlite3.Connection, table: Table) -> Iterator[Row]:
-    """Rows of a table by ascending key, one by one, without their checksums, which are checked.
+    """Yield the rows of a table by ascending key, without their checksums, which are checked.
 
     Raises
     ------
     MapFileError
-        If a row is not what was written; after the last one, if any is missing.
+        If a row differs from its checksum; after the last row, if rows are missing.
     """
     query = f"SELECT {', '.join(table.columns)} FROM {table.name} ORDER BY {', '.join(table.keys)}"
     n, sums = 0, 0
@@ -63,7 +63,7 @@ def read_rows(connection: sqlite3.Connection, table: Table) -> list[Row]:
 
 
 def read_one(connection: sqlite3.Connection, table: Table) -> Row:
-    """The row of a table that has one."""
+    """Return the row of a table with one row."""
     rows = read_rows(connection, table)
     if len(rows) != 1:
         raise MapFileError(f"the table {table.name} is empty")
@@ -71,7 +71,7 @@ def read_one(connection: sqlite3.Connection, table: Table) -> Row:
 
 
 class BlobTable:
-    """A table of arrays, cut into rows; sizes are read and checked at once.
+    """A table of arrays, split into rows; sizes are read and checked at once.
 
     Parameters
     ----------
@@ -109,16 +109,16 @@ class BlobTable:
             self._present[blob.field] = present & (present.all() or not blob.all_or_none)
 
     def has(self, field: str) -> NDArray[np.bool_]:
-        """(n,) which rows hold something of an optional array."""
+        """(n,) mask of the rows that have values of an optional array."""
         return self._present[field]
 
     def whole(self) -> dict[str, NDArray[Any]]:
-        """All rows, one after the other, as arrays by field."""
+        """All rows, concatenated, as arrays by field."""
         ((arrays, _),) = self.parts(max(1, len(self.counts)))
         return arrays
 
     def parts(self, rows_each: int = _PART) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
-        """Arrays by field of `rows_each` rows at a time, and their number; at least one part."""
+        """Arrays by field of `rows_each` rows each time, and their number; at least one part."""
         rows = each_row(self._connection, self._table)
         begin = 0
         while True:
@@ -161,7 +161,7 @@ class BlobTable:
         return arrays
 
     def _put(self, row: Row, number: int, arrays: Mapping[str, NDArray[Any]], place: int) -> int:
-        """Copy a row's blobs into the arrays; returns its count."""
+        """Copy the blobs of a row into the arrays; return its count."""
         first = len(self._table.keys)
         count = row[first]
         if number >= len(self.counts) or count != self.counts[number]:
@@ -184,14 +184,14 @@ def _size_of(blob: Blob) -> int:
 
 
 class MapTables:
-    """The map in an open file, of which nothing but checksums and sizes has been checked yet.
+    """The map in an open file; only checksums and sizes have been checked yet.
 
     Parameters
     ----------
     connection
-        To the file, in a transaction.
+        The connection, in a transaction.
     tables
-        Those of the file's version.
+        Tables of the file's version.
     """
 
     def __init__(self, connection: sqlite3.Connection, tables: Mapping[str, Table]) -> None:
@@ -209,7 +209,7 @@ class MapTables:
         return self._contents(self._keypoints.whole())
 
     def without_keypoints(self) -> dict[str, Any]:
-        """All but the keypoints, which `keypoint_parts` gives: as the C++ core takes it."""
+        """All but the keypoints (see `keypoint_parts`), for the C++ core."""
         none = {
             blob.field: np.zeros((0, blob.width) if blob.width else 0, blob.dtype)
             for blob in self._tables["keypoints"].blobs
@@ -217,7 +217,7 @@ class MapTables:
         return self._contents(none).as_dict()
 
     def keypoint_parts(self) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
-        """Keypoints of some keyframes at a time, as the C++ core takes them, and of how many."""
+        """Keypoints of some keyframes each time, for the C++ core, and the number of keyframes."""
         for arrays, n in self._keypoints.parts():
             arrays.setdefault("words", np.zeros(0, np.uint32))
             yield {f"keyframes.{name}": array for name, array in arrays.items()}, n

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing map files: whole ones that appear at once, then what changes, one commit at a time."""
+"""Writing of map files: complete ones first, then changes, one commit each."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SIDE_FILES = ("-wal", "-shm", "-journal")
 
 
 def _upsert(table: Table) -> str:
-    """Write a row, or change it in place: replacing it would delete what refers to it."""
+    """Insert a row, or update it in place: a replacement would delete rows that refer to it."""
     marks = ", ".join("?" * len(table.columns))
     changes = ", ".join(
         f"{column} = excluded.{column}" for column in table.columns if column not in table.keys
@@ -52,25 +52,25 @@ _UPSERT = {name: _upsert(table) for name, table in TABLES.items()}
 
 
 class MapWriter:
-    """Keeps a map file up to date with a map, commit by commit.
+    """Updates a map file commit by commit.
 
-    The first `commit` writes a file of its own, which takes the place of `path` when it is
-    complete; later ones change only the rows that differ. After a crash the file is that of the
-    last commit. To be used by one thread at a time; `close` at the end.
+    The first `commit` writes a separate file, which replaces `path` when it is complete; later ones
+    change only the rows that differ. After a crash the file contains the last commit. Use it in one
+    thread at a time, and `close` it at the end.
 
     Parameters
     ----------
     path
         The map file; replaced by the first commit.
     once
-        There will be one commit only: nothing is touched any more once the file is in its place.
+        There will be only one commit: the file does not change after it is in its place.
 
     Attributes
     ----------
     path : Path
-        The file itself, where `path` is a link to it.
+        The file itself, if `path` is a link.
     begun : bool
-        The file may hold what was committed, also if that failed afterwards.
+        Whether the file may contain the committed data, even if a later step failed.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, once: bool = False) -> None:
@@ -85,11 +85,11 @@ class MapWriter:
         self._written = _nothing()
 
     def has(self, table: str, *key: int) -> bool:
-        """Whether the file holds a row."""
+        """Return whether the file has a row."""
         return key in self._written[table]
 
     def keys(self, table: str) -> Set[Row]:
-        """Keys of the rows that the file holds."""
+        """Return the keys of the rows in the file."""
         return self._written[table].keys()
 
     def commit(
@@ -97,22 +97,22 @@ class MapWriter:
         rows: Iterable[tuple[str, Row]],
         kept: Mapping[str, Set[Row]] = MappingProxyType({}),
     ) -> int:
-        """Make the file hold these rows, in one transaction; returns how many were written.
+        """Write these rows in one transaction; return how many were written.
 
-        Rows of tables that may change and are not given are deleted. Those that are written once
-        stay, but for keypoints and images of keyframes that are no longer there.
+        Rows of variable tables that are not given are deleted. Rows of other tables are kept,
+        except keypoints and images of removed keyframes.
 
         Parameters
         ----------
         rows
             (table, row) pairs.
         kept
-            Keys of rows that stay though they are not given, by table.
+            Keys of rows to keep although they are not given, by table.
 
         Raises
         ------
         MapFileError
-            If the file cannot be written; what was there before stays.
+            If the file cannot be written; the earlier contents are kept.
         """
         with _naming(self._named):
             if self._connection is None:
@@ -120,16 +120,16 @@ class MapWriter:
             return self._change(self._connection, rows, kept)
 
     def close(self) -> None:
-        """End with a single file, without a log beside it; idempotent.
+        """End with a single file without a log; further calls do nothing.
 
-        While another program has the file open, the log stays, and a warning says so: the two hold
-        all that was committed. If a Ctrl-C comes before it is done, the file is still open, and can
-        be written and closed.
+        If another program has the file open, the log remains, with a warning: both files together
+        contain all commits. If a Ctrl-C interrupts it, the file is still open; it can be written
+        and closed.
 
         Raises
         ------
         MapFileError
-            If what was committed may not be on the disk. The file is closed all the same.
+            If commits may not have reached the disk. The file is closed in any case.
         """
         connection = self._connection
         if connection is None:
@@ -242,7 +242,7 @@ def _roll_back(connection: sqlite3.Connection) -> None:
 
 
 def connect(path: Path, mode: str) -> sqlite3.Connection:
-    """Open a database file; transactions are begun and ended by hand.
+    """Open a database file; the caller begins and ends transactions.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def _others(
     seen: dict[str, set[Row]],
     kept: Mapping[str, Set[Row]],
 ) -> list[tuple[str, Row]]:
-    """What the file holds and the map no longer has; keypoints before their keyframes."""
+    """Return rows of the file that the map no longer has; keypoints before their keyframes."""
     gone = [
         (name, key)
         for name, known in written.items()
@@ -296,7 +296,7 @@ def _write_totals(connection: sqlite3.Connection, written: dict[str, dict[Row, i
 # ---- the file ---------------------------------------------------------------------------------
 @contextlib.contextmanager
 def _naming(path: str) -> Iterator[None]:
-    """Say which file could not be written, and why, in words for people."""
+    """Return a message that names the file and says why it could not be written."""
     try:
         yield
     except sqlite3.IntegrityError as error:
@@ -327,7 +327,7 @@ def _remedy_for(message: str) -> str:
 
 
 def check_map_target(path: str | os.PathLike[str]) -> None:
-    """Raise `MapFileError` if a map file cannot be written there, before there is a map."""
+    """Raise `MapFileError` if a map file cannot be written there; for use before there is a map."""
     named = str(path_of(path, "the map file", MapFileError))
     target = Path(os.path.realpath(path))
     with _naming(named):
@@ -367,9 +367,9 @@ def _check_target(path: Path, named: str) -> None:
 
 
 def _end_old_log(path: Path) -> None:
-    """Put the log of a killed writer into the file that is about to be replaced.
+    """Move the log of a killed writer into the file that will be replaced.
 
-    Else it would be taken for the new file's.
+    Otherwise it would count as the log of the new file.
     """
     logs = [path.with_name(f"{path.name}{suffix}") for suffix in _SIDE_FILES]
     if path.exists() and any(log.exists() for log in logs):

@@ -32,29 +32,29 @@ def write_ply(
     unit: str = "m",
     frame: str = FIRST_KEYFRAME_AXES,
 ) -> None:
-    """Write points as a binary PLY file that common viewers open.
+    """Write points as a binary PLY file for common viewers.
 
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     points
         Positions (p, 3) in the frame of keyframe 0's camera; written as float32.
     colours
-        Red, green and blue of every point, uint8 (p, 3); none are written if None.
+        Red, green and blue of every point, uint8 (p, 3); None: no colours.
     unit
-        Of the positions, for the comment in the file: metres, or ``units`` for one camera, whose
-        unit of length is its own.
+        Unit of the positions, for the comment in the file: metres, or ``units`` for one camera,
+        whose map has its own unit.
     frame
-        What the axes are, for the comment in the file.
+        Description of the axes, for the comment in the file.
 
     Raises
     ------
     OSError
         If the file cannot be written; an existing file is kept then.
     DatasetError
-        If the points or the colours are no such array, there is not one colour per point, or the
-        path is none.
+        If the arrays are invalid, if the numbers of colours and points differ, or if the path is
+        invalid.
     """
     path = path_of(path, "the file of points")
     positions = array_of(points, "points", (-1, 3), finite=False)
@@ -80,12 +80,12 @@ def write_ply(
 
 
 def colours_of(value: Any, n_points: int) -> ByteArray:
-    """Take one colour per point.
+    """Check that there is one colour for each point.
 
     Raises
     ------
     DatasetError
-        For anything but uint8 (p, 3): numbers from 0 to 1 would all be black.
+        For anything but uint8 (p, 3): numbers from 0 to 1 would all become black.
     """
     wanted = f"give red, green and blue from 0 to 255, uint8 ({n_points}, 3)"
     if not isinstance(value, np.ndarray):
@@ -98,7 +98,7 @@ def colours_of(value: Any, n_points: int) -> ByteArray:
 
 
 def read_points(path: str | Path) -> FloatArray:
-    """Read the positions of a binary PLY file: one of `write_ply`, or one with more columns.
+    """Read the positions of a binary PLY file, of `write_ply` or with more columns.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def read_points(path: str | Path) -> FloatArray:
     Raises
     ------
     DatasetError
-        Naming the file, if it is no such file or not whole.
+        If it is no such file or is incomplete; the message names the file.
     OSError
         If it cannot be read.
     """

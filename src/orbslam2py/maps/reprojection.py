@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the keyframes of a map should see its points, and where they did."""
+"""Predicted and measured pixels of the points in the keyframes of a map."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from orbslam2py.maps.contents import MapContents, contents_of
 
 
 def reprojection_errors(contents: MapContents) -> FloatArray:
-    """Tell how far keypoints are from where their points are expected.
+    """Return the distances of keypoints from the predicted pixels of their points.
 
     Returns
     -------
@@ -21,7 +21,7 @@ def reprojection_errors(contents: MapContents) -> FloatArray:
     Raises
     ------
     MapFileError
-        If `contents` is something else.
+        If `contents` is invalid.
     """
     contents_of(contents)
     keyframes, observations = contents.keyframes, contents.observations
@@ -35,7 +35,7 @@ def reprojection_errors(contents: MapContents) -> FloatArray:
 def project_points(
     contents: MapContents, rows: IntArray, points: IntArray, bent: NDArray[np.bool_]
 ) -> FloatArray:
-    """Tell where keyframes see points.
+    """Predict the pixels of points in keyframes.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ def project_points(
     rows, points
         Rows of keyframes and of points, (s,) each.
     bent
-        Through the lens, with OpenCV's distortion, or as a pinhole camera; bool (s,). A fisheye
-        camera has but one image.
+        Whether to apply OpenCV's distortion, or none (pinhole), bool (s,). Fisheye cameras always
+        use their own model.
 
     Returns
     -------

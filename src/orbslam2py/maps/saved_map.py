@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a map file holds: the map, and what must be known to use it."""
+"""The contents of a map file: the map, and all that is needed to use it."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ def _sha256_of(vocabulary: core.Vocabulary) -> str:
 
 @dataclass(frozen=True)
 class VocabularyIdentity:
-    """Which visual words a map was made with."""
+    """Identity of a vocabulary."""
 
     name: str
-    """Of the file; empty when it was made in memory."""
+    """Name of the file; empty if it was made in memory."""
     hash: str
-    """SHA-256 of the content, 64 hexadecimal digits, as ``orbslam2py vocabulary info`` shows it. In
-    map files of version 1 a shorter hash of 16 digits."""
+    """SHA-256 of the content, 64 hexadecimal digits, as ``orbslam2py vocabulary info`` shows it.
+    Map files of version 1 have a shorter hash of 16 digits."""
     comment: str = ""
-    """Where it comes from, its licence."""
+    """Origin and licence."""
 
     @classmethod
     def of(cls, vocabulary: core.Vocabulary, name: str = "") -> VocabularyIdentity:
@@ -53,14 +53,14 @@ class VocabularyIdentity:
         return cls(name, _sha256_of(vocabulary), vocabulary.comment)
 
     def is_of(self, vocabulary: core.Vocabulary) -> bool:
-        """Whether it is this vocabulary, by its content."""
+        """Return whether a vocabulary has this identity."""
         short = f"{vocabulary.hash:016x}"
         return self.hash == (short if len(self.hash) == len(short) else _sha256_of(vocabulary))
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedFrames:
-    """Where the images of a run were, relative to keyframes: (n,) entries each."""
+    """Poses of the images of a run relative to keyframes: (n,) entries each."""
 
     timestamps: FloatArray
     """Seconds."""
@@ -69,10 +69,10 @@ class RecordedFrames:
     keyframes: IntArray
     """Ids of living or removed keyframes; -1 before the first pose."""
     T_cr: FloatArray
-    """(n, 7) keyframe's camera to the image's at the keyframe's first scale: unit quaternion x, y,
-    z, w, then the translation."""
+    """(n, 7) camera of the keyframe to that of the image at the keyframe's first scale: unit
+    quaternion x, y, z, w, then the translation."""
     lost: ByteArray
-    """1 where tracking was lost; the pose then is the last known one."""
+    """1 if tracking was lost; the pose is then the last known one."""
 
     def __len__(self) -> int:
         return len(self.timestamps)
@@ -96,16 +96,16 @@ class Run:
     program: str
     """Name and version, such as ``orbslam2py 0.1.0``."""
     started: str
-    """When, as ISO 8601 in UTC."""
+    """Time, as ISO 8601 in UTC."""
     seed: int = 0
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Those of the system, by their names."""
+    """Options of the system, by name."""
     frames: RecordedFrames = field(default_factory=RecordedFrames.none)
 
 
 @dataclass(frozen=True, eq=False)
 class SavedMap:
-    """A map with its camera, its visual words and the runs that made it: one map file.
+    """A map with its camera, its vocabulary and its runs: the contents of one map file.
 
     Examples
     --------
@@ -118,7 +118,7 @@ class SavedMap:
     vocabulary: VocabularyIdentity
     runs: tuple[Run, ...] = ()
     images: Mapping[int, bytes] = field(default_factory=dict)
-    """JPEG of some keyframes, by their ids."""
+    """JPEG images of some keyframes, by their ids."""
     source: str = ""
     """The file that it was read from."""
 
@@ -150,30 +150,30 @@ class SavedMap:
         slam_map
             An empty map to fill.
         vocabulary
-            Describes the keyframes by words: those that are known, if it is the one that the map
-            was made with.
+            Vocabulary for the words of the keyframes; known words are used if they are of this
+            vocabulary.
         index
-            Gets the keyframes, once they are described.
+            Gets the keyframes with their words.
         """
         fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
         restore_contents(self.contents, slam_map, vocabulary, index, words_fit=fits)
 
     def trajectory(self, run: int = -1, map_number: int | None = None) -> Trajectory:
-        """Where the images of a run were, in the map as it is now.
+        """Return the poses of the images of a run in the present map.
 
         Parameters
         ----------
         run
-            Which of `runs`; the last one by default.
+            Number in `runs`; the last one by default.
         map_number
-            Which of several maps, from 0 for the oldest one; by default the one that most images
-            of the run are in.
+            Number of the map, from 0 for the oldest; by default the one with most images of the
+            run.
 
         Returns
         -------
         Trajectory
-            Of the images in that map, relative to its first keyframe; empty when the map has no
-            runs.
+            Trajectory of the images in that map, relative to its first keyframe; empty if the map
+            has no runs.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class SavedMap:
         return Trajectory(frames.timestamps, T_wc, frames.lost != 0, frames.ids)
 
     def _maps_of(self, wanted: IntArray) -> IntArray:
-        """Numbers of the maps of keyframes (n,), removed ones included; -1 for none."""
+        """Return the numbers of the maps of keyframes (n,), with removed ones; -1 for none."""
         keyframes, removed = self.contents.keyframes, self.contents.removed_keyframes
         ids = np.concatenate([keyframes.ids, removed.ids])
         order = np.argsort(ids)
@@ -221,7 +221,7 @@ class SavedMap:
         return np.where(wanted < 0, -1, np.searchsorted(roots, rows[order[known]]))
 
     def _keyframe_poses(self, wanted: IntArray) -> tuple[FloatArray, FloatArray]:
-        """`T_cw` (n, 4, 4) and scale (n,) of keyframes, removed ones by those they hang on."""
+        """Return `T_cw` (n, 4, 4) and scale (n,) of keyframes, also of removed ones."""
         keyframes, removed = self.contents.keyframes, self.contents.removed_keyframes
         row = {int(i): k for k, i in enumerate(keyframes.ids)}
         hangs = {int(i): k for k, i in enumerate(removed.ids)}
@@ -254,7 +254,7 @@ class SavedMap:
 
 
 def _number_of(value: Any, what: str, first: int, end: int) -> int:
-    """Take one of the numbers from `first` to below `end`."""
+    """Check that a number is at least `first` and below `end`."""
     if not is_whole(value) or not first <= value < end:
         raise MapFileError(
             f"{what} is {shown(value)}; give a whole number from {first} to {end - 1}"
@@ -268,7 +268,7 @@ def saved_of(value: Any, what: str = "the map") -> SavedMap:
     Raises
     ------
     MapFileError
-        For anything else, also for a path or for `MapContents`.
+        For any other object, also for a path or for `MapContents`.
     """
     remedy = "a SavedMap, as from load_map(path) or System.saved_map()"
     return instance_of(value, SavedMap, what, remedy, MapFileError)

@@ -24,16 +24,16 @@ class Blob(NamedTuple):
 
     column: str
     field: str
-    """Name of the array in the group of `MapContents` that the table holds."""
+    """Name of the array in its group of `MapContents`."""
     dtype: str
     width: int = 0
-    """Items a row, for arrays (n, width); 0 for arrays (n,)."""
+    """Items per row, for arrays (n, width); 0 for arrays (n,)."""
     optional: bool = False
-    """NULL when the array is empty."""
+    """NULL if the array is empty."""
     sparse: bool = False
-    """NULL in single rows too, which are zeros in the array."""
+    """NULL also in single rows, which are zeros in the array."""
     all_or_none: bool = False
-    """NULL in single rows too; the array is then empty: it is of use only where all have it."""
+    """NULL also in single rows; then the array is empty, because it needs values of all rows."""
 
 
 KEYPOINTS = (
@@ -89,7 +89,7 @@ class Table(NamedTuple):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of all columns, in the order of the rows; blobs follow their count."""
+        """Return the names of all columns, in their order; the count comes before blobs."""
         count = ("count",) if self.blobs else ()
         return (
             *self.keys,
@@ -164,9 +164,9 @@ def _blob_columns(blobs: tuple[Blob, ...]) -> str:
 
 
 def create_script(version: int = FORMAT_VERSION) -> str:
-    """SQL that makes the tables of a version of the format.
+    """Return the SQL that makes the tables of a version of the format.
 
-    Rows carry their checksums; `totals` counts the rows and adds them up.
+    Rows have checksums; `totals` has the number of rows and the sum of checksums.
     """
     tables = tables_of(version)
     keypoints = _blob_columns(tables["keypoints"].blobs)
@@ -183,7 +183,7 @@ HEADER_SIZE = 100
 
 
 def application_of(header: bytes) -> int | None:
-    """Id of the application whose SQLite file begins so; None if it is no SQLite file."""
+    """Return the application id of an SQLite file; None if it is no SQLite file."""
     if len(header) < HEADER_SIZE or not header.startswith(b"SQLite format 3\x00"):
         return None
     return int.from_bytes(header[68:72], "big")

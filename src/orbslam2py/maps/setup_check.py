@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a saved map can be used with a camera and visual words."""
+"""Whether a saved map fits a camera and a vocabulary."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def check_sensor(saved: SavedMap | MapFile, sensor: Sensor) -> None:
 def check_made_alike(files: Sequence[SavedMap | MapFile]) -> None:
     """Raise `SettingsError`, naming both, unless maps were made with one sensor and one camera.
 
-    What is no saved map, such as a path, gets a `MapFileError`.
+    Any other object, such as a path, raises `MapFileError`.
     """
     for saved in files:
         if not isinstance(saved, MapFile):
@@ -76,7 +76,7 @@ def check_vocabulary(
 ) -> None:
     """Raise `MapFileError` unless the map was made with these visual words.
 
-    With `may_differ` the message tells how they can be others all the same.
+    With `may_differ` the message says how to allow a difference.
     """
     made_with = saved.vocabulary
     if not made_with.is_of(vocabulary):

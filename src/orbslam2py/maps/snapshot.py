@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What users see of the map: copies, taken while the system may be running."""
+"""Copies of the map for users, made while the system may be running."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from orbslam2py.trajectory import Trajectory
 class MapSnapshot:
     """A consistent copy of a map, in the frame of its first keyframe's first pose (the world).
 
-    Of several maps each has a world of its own: where keyframes of two of them are to each other,
-    nobody knows. Two snapshots are equal if all their arrays are, bit by bit.
+    Each of several maps has a separate world: the relative pose of two maps is not known. Two
+    snapshots are equal if all their arrays are, bit by bit.
     """
 
     keyframe_ids: IntArray
@@ -33,7 +33,7 @@ class MapSnapshot:
     loop_edges: IntArray
     """(l, 2) ids of the keyframes that a closed loop connects."""
     map_index: int = field(default=0, compare=False)
-    """The map that all of it belongs to, as in `TrackingRecord.map_index`; not compared."""
+    """Number of its map, as in `TrackingRecord.map_index`; not compared."""
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MapSnapshot):
@@ -61,7 +61,7 @@ def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapsh
     slam_map
         The map or maps.
     map_index
-        Which; the active one if None.
+        Number of the map; None: the active one.
     """
     chosen = int(slam_map.active_map) if map_index is None else map_index
     snapshot = core.snapshot_map(slam_map, chosen)
@@ -81,7 +81,7 @@ def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapsh
 
 
 def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
-    """Copy all maps, the oldest first; no keyframe or point is in two of them.
+    """Copy all maps, the oldest first; no keyframe or point belongs to two of them.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
 def keyframe_trajectory(slam_map: core.Map, map_index: int | None = None) -> Trajectory:
     """Poses of the keyframes of a map (None: the active one), relative to the first one.
 
-    In the order of time; that of their ids may differ where a single camera's map began.
+    In the order of time; the order of ids may differ at the start of a single camera's map.
     """
     keyframes = core.snapshot_keyframes(slam_map, -1 if map_index is None else map_index)
     T_wc = keyframes.T_wc

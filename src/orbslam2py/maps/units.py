@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the lengths of a map are in."""
+"""The unit of length of a map."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ from orbslam2py.maps.contents import MapContents
 
 
 def sees_metres(contents: MapContents) -> bool:
-    """Whether the camera itself tells metres: a stereo pair, or depth images."""
+    """Return whether the camera measures metres: a stereo pair, or depth images."""
     return bool((contents.cameras.bf > 0).any())
 
 
 def unit_of(contents: MapContents, root: int | None = None) -> str:
-    """Tell the unit of lengths.
+    """Return the unit of length.
 
     Parameters
     ----------
     contents
         The map or maps.
     root
-        First keyframe of the one that is asked about; all of them by default.
+        First keyframe of the map; all maps by default.
 
     Returns
     -------
     str
-        ``m``, or ``units`` for the map of a single camera, whose unit is its own unless it was
-        given metres.
+        ``m``, or ``units`` for a single camera's map whose unit was not set to metres.
     """
     if sees_metres(contents):
         return "m"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Everything that can be checked about a map file."""
+"""All checks of a map file."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _COPY = "the file is damaged, use a copy of it"
 
 
 def verify_map_file(path: str | os.PathLike[str]) -> SavedMap:
-    """Read a map file as `load_map` does, and check what that takes for granted.
+    """Read a map file as `load_map` does, and check what `load_map` does not check.
 
-    `load_map` checks header, tables, checksums, sizes, ids and ranges of numbers. Beyond that: the
-    database's own pages and indices, its foreign keys, the invariants of the map that is made of it
-    (``docs/method/map.md#invariants``), and that the images are images.
+    `load_map` checks header, tables, checksums, sizes, ids and ranges of numbers. Further checks:
+    the pages, indices and foreign keys of the database, the invariants of its map
+    (``docs/method/map.md#invariants``), and that its images are images.
 
     Parameters
     ----------
     path
-        The file; it is not changed.
+        The file; it is only read.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def verify_map_file(path: str | os.PathLike[str]) -> SavedMap:
     Raises
     ------
     MapFileError
-        Naming the file and the first thing that is wrong.
+        The message names the file and the first fault.
     """
     saved = load_map(path, images=True)
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of images, maps and times, drawn from plain arrays: no screen, no running system."""
+"""Pictures of images, maps and times from plain arrays, without a running system."""
 
 from orbslam2py.pictures.composition import Composition, compose
 from orbslam2py.pictures.framing import Framing, frame_all

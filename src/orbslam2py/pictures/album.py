@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of keyframes, kept on disk: a long run has thousands."""
+"""Pictures of keyframes, stored on disk, because a long run has thousands."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class KeyframePicture:
     """(h, w, 3) red, green, blue, keypoints marked."""
     n_keypoints: int
     n_matched: int
-    """Keypoints that were matched to the map when the image came."""
+    """Number of keypoints with a match in the map, at the time of the image."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class _Place:
 
 
 class Album:
-    """Pictures by keyframe, in a file without a name that ends with the album."""
+    """Pictures by keyframe, in a temporary file without a name."""
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile(prefix="orbslam2py-")  # noqa: SIM115  # see close
@@ -47,7 +47,7 @@ class Album:
         self._full = False
 
     def add(self, keyframe: int, picture: KeyframePicture) -> None:
-        """Keep the picture of a keyframe; on a disk that is full, no more from then on."""
+        """Store the picture of a keyframe; once the disk is full, no more are stored."""
         if self._full:
             return
         bgr = np.ascontiguousarray(picture.image[:, :, ::-1])
@@ -73,7 +73,7 @@ class Album:
         self._end += len(data)
 
     def find(self, keyframe: int) -> KeyframePicture | None:
-        """The picture of a keyframe, if there is one."""
+        """Return the picture of a keyframe, if there is one."""
         place = self._places.get(keyframe)
         if place is None:
             return None
@@ -86,7 +86,7 @@ class Album:
         return KeyframePicture(image, place.n_keypoints, place.n_matched)
 
     def clear(self) -> None:
-        """Forget all: another map has begun."""
+        """Drop all pictures: another map has begun."""
         self._places = {}
         self._end = 0
 

@@ -30,16 +30,16 @@ class Box:
         return self.width, self.height
 
     def put(self, picture: ByteArray, part: ByteArray) -> None:
-        """Copy a part of this size to its place."""
+        """Copy a part of this size to its position."""
         picture[self.y : self.y + self.height, self.x : self.x + self.width] = part
 
 
 @dataclass(frozen=True)
 class Composition:
-    """Where everything is in a picture."""
+    """The layout of a picture."""
 
     size: tuple[int, int]
-    """Width and height of all of it [px]."""
+    """Width and height of the whole picture [px]."""
     image: Box
     status: Box
     map: Box
@@ -60,7 +60,7 @@ def compose(image_size: tuple[int, int], size: tuple[int, int]) -> Composition:
     Parameters
     ----------
     image_size : (int, int)
-        Width and height of the camera's images [px]: of any shape.
+        Width and height of the camera's images [px], of any ratio.
     size : (int, int)
         Width and height of the whole picture [px].
     """
@@ -91,7 +91,7 @@ def compose(image_size: tuple[int, int], size: tuple[int, int]) -> Composition:
 def _with_wide_image(
     image_size: tuple[int, int], size: tuple[int, int], text: int, gap: int
 ) -> Composition:
-    """A column of image, status and time line; the map beside it takes the whole height."""
+    """A column of image, status and time line; the map beside it has the full height."""
     width, height = size
     column = round(0.62 * width)
     status = status_height(column)

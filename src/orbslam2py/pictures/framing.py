@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which part of a plane is seen: a window that follows what grows in it, without a jump."""
+"""The visible part of a plane: a window that follows a growing box smoothly."""
 
 from __future__ import annotations
 
@@ -24,33 +24,33 @@ _SMALLEST = 0.2
 
 @dataclass(frozen=True)
 class Framing:
-    """A window to the plane, on its way to where it is to be.
+    """A window on the plane that moves to its target.
 
-    Its state is (x and y of its middle, logarithm of the lengths that a pixel shows).
+    Its state is (x and y of its centre, logarithm of the length of a pixel).
     """
 
     state: FloatArray
     """(3,)"""
     speed: FloatArray
-    """(3,) change of the state a second."""
+    """(3,) change of the state per second."""
     goal: FloatArray
-    """(3,) the state that it moves to."""
+    """(3,) the target of the state."""
     size: tuple[int, int]
     """Width and height of the picture [px]."""
 
     @property
     def unit_per_pixel(self) -> float:
-        """Length of the plane that a pixel shows."""
+        """Length of a pixel in the plane."""
         return float(np.exp(self.state[2]))
 
     def to_pixels(self, places: npt.NDArray[np.floating]) -> FloatArray:
-        """Pixels (..., 2) of places (..., 2) in the plane, whose y goes up."""
+        """Return pixels (..., 2) of points (..., 2) in the plane, whose y axis goes up."""
         middle = 0.5 * (np.array(self.size) - 1)
         scale = np.array([1.0, -1.0]) / self.unit_per_pixel
         return np.asarray((places - self.state[:2]) * scale + middle)
 
     def shows(self, low: FloatArray, high: FloatArray, state: FloatArray | None = None) -> bool:
-        """Whether a box of the plane lies inside, and is not lost in it."""
+        """Return whether a box of the plane is inside, and not too small."""
         x, y, log_scale = self.state if state is None else state
         half = 0.5 * np.array(self.size) * np.exp(log_scale)
         inside = np.abs(np.stack([low, high]) - (x, y)).max(axis=0) <= (1 - 2 * _MARGIN) * half
@@ -58,14 +58,14 @@ class Framing:
         return bool(inside.all() and log_scale - fitting < np.log(_TOO_LARGE))
 
     def follow(self, low: FloatArray, high: FloatArray, seconds: float) -> Framing:
-        """Move on for some time, so that a box of the plane stays in sight.
+        """Move for some time, so that a box of the plane stays visible.
 
-        The way to the goal is that of a critically damped spring: it begins and ends softly.
+        The motion is that of a critically damped spring: it begins and ends smoothly.
 
         Parameters
         ----------
         low, high : array of float64, (2,)
-            Corners of what is to be seen.
+            Corners of the visible box.
         seconds : float
             Time that passes.
         """
@@ -87,12 +87,12 @@ class Framing:
 
 
 def frame_all(low: FloatArray, high: FloatArray, size: tuple[int, int]) -> Framing:
-    """Make a window that shows a box of the plane, with some room around it.
+    """Make a window that shows a box of the plane, with a margin.
 
     Parameters
     ----------
     low, high : array of float64, (2,)
-        Corners of what is to be seen.
+        Corners of the visible box.
     size : (int, int)
         Width and height of the picture [px].
     """

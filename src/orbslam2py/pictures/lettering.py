@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Text in pictures: drawn once, then copied from memory.
+"""Text in pictures: each text is drawn once, then copied from memory.
 
-Pillow draws DejaVu's letters, which Matplotlib brings along: OpenCV's own are strokes that are hard
-to read when small, and end with ASCII.
+Pillow draws DejaVu's letters, which come with Matplotlib: OpenCV's own are hard to read when small,
+and only ASCII.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def draw_text(
     bold: bool = False,
     anchor: Anchor = "left",
 ) -> None:
-    """Write a line of text into a picture; what lies outside is cut off.
+    """Write a line of text into a picture; parts outside are cut off.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def draw_text(
     size : int
         Height of the letters from top to bottom [px].
     colour : (int, int, int)
-        As the channels of the picture are ordered.
+        In the order of the picture's channels.
     bold : bool
         Heavier letters.
     anchor : str
-        What `place` is of the text: left, centre or right.
+        Position of `place` in the text: left, centre or right.
     """
     letters = _letters(text, size, bold)
     h, w = letters.shape
@@ -82,7 +82,7 @@ def draw_text(
 
 @lru_cache(maxsize=512)
 def _letters(text: str, size: int, bold: bool) -> ByteArray:
-    """How much each pixel is covered by the text (h, w), 0 to 255."""
+    """Return the coverage of each pixel by the text (h, w), 0 to 255."""
     font = _font(size, bold)
     left, _, right, _ = font.getbbox(text, anchor="ls")
     left = min(0, math.floor(left))

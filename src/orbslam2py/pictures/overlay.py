@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The image as the system sees it: its keypoints, and one line that says how it goes.
+"""The image with its keypoints, and a line with the state of the system.
 
-Plain arrays in, a picture out: nothing here knows a running system.
+It uses plain arrays, and does not depend on a running system.
 """
 
 from __future__ import annotations
@@ -48,28 +48,28 @@ def _no_lines() -> Pixels:
 
 @dataclass(frozen=True)
 class Marks:
-    """What is to be marked in an image, in its pixels; the centre of the first is (0, 0)."""
+    """Marks in an image, in its pixels; the centre of the first is (0, 0)."""
 
     mapped: Pixels = field(default_factory=_no_keypoints)
     """(n, 2) keypoints that are matched to the map: squares with a dot."""
     visual_odometry: Pixels = field(default_factory=_no_keypoints)
-    """(m, 2) keypoints that are matched to the frame before only: diamonds."""
+    """(m, 2) keypoints that are only matched to the frame before: diamonds."""
     unmatched: Pixels = field(default_factory=_no_keypoints)
     """(k, 2) other keypoints: faint dots."""
     start_lines: Pixels = field(default_factory=_no_lines)
-    """(s, 4) x, y in the first view, then x, y now, while a single camera starts."""
+    """(s, 4) x, y in the first view, then in the present image, while a single camera starts."""
 
 
 @dataclass(frozen=True)
 class Status:
-    """What the line below the image says."""
+    """Return the text of the status line."""
 
     state: TrackingState
     """After the image."""
     reason: str = ""
     """Why there is no pose."""
     localization: bool = False
-    """Localization mode: the map stays as it is."""
+    """Localization mode: the map is fixed."""
     n_keyframes: int = 0
     """In the map."""
     n_points: int = 0
@@ -77,22 +77,22 @@ class Status:
     n_matches: int = 0
     """Keypoints matched to the map."""
     n_visual_odometry: int = 0
-    """Keypoints matched to the frame before only."""
+    """Keypoints that are only matched to the frame before."""
     frames_per_second: float | None = None
-    """Tracked lately; None if it is of no interest."""
+    """Images tracked per second; None to leave it out."""
     n_dropped: int | None = None
-    """Frames that were not looked at, for want of time; None if none can be."""
+    """Number of images that were dropped for lack of time; None if none can be."""
     skipped: bool = False
     """The image could not be used, or there was no time for it; `reason` says which."""
 
     @property
     def mode(self) -> str:
-        """What the system does: mapping, or localization in the map as it is."""
+        """Return the mode: mapping, or localization in a fixed map."""
         return "LOCALIZATION" if self.localization else "SLAM"
 
     @property
     def words(self) -> str:
-        """The state in words, and the reason if there is no pose."""
+        """Return the state in words, and the reason if there is no pose."""
         if self.skipped:
             words = "image not used"
         elif self.state is TrackingState.OK:
@@ -107,7 +107,7 @@ class Status:
 
     @property
     def colour(self) -> Colour:
-        """The colour that stands for the state."""
+        """Return the colour of the state."""
         return state_colour(self.state, skipped=self.skipped, visual_odometry=self._wanders)
 
     @property
@@ -131,14 +131,14 @@ class Status:
 
     @property
     def _wanders(self) -> bool:
-        """Outside of the map, as may be in localization mode."""
+        """Outside the map, which is possible in localization mode."""
         return self.n_visual_odometry > self.n_matches
 
 
 def state_colour(
     state: TrackingState, *, skipped: bool = False, visual_odometry: bool = False
 ) -> Colour:
-    """Choose the colour that stands for a tracking state, in every picture the same."""
+    """Return the colour of a tracking state, the same in every picture."""
     if skipped:
         return NOT_TRACKED
     if state is TrackingState.OK:
@@ -174,7 +174,7 @@ def to_rgb(image: ByteArray, *, rgb: bool = True) -> ByteArray:
 
 
 def fit_size(image_size: tuple[int, int], room: tuple[int, int]) -> tuple[int, int]:
-    """Largest width and height with the shape of an image within a room; at least one pixel.
+    """Return the largest size with the ratio of an image within a space; at least one pixel.
 
     Parameters
     ----------
@@ -194,18 +194,18 @@ def draw_overlay(
     size: tuple[int, int] | None = None,
     rgb: bool = True,
 ) -> ByteArray:
-    """Draw an image with its keypoints and, if wanted, its status line below.
+    """Draw an image with its keypoints and, optionally, its status line below.
 
     Parameters
     ----------
     image : array of uint8, (h, w), (h, w, 3) or (h, w, 4)
-        Grey or colour; stays as it is.
+        Grey or colour; it is not changed.
     marks : Marks
-        What is to be seen in it.
+        Marks in the image.
     status : Status, optional
-        For the line below; none is drawn without.
+        Contents of the status line; None: no line.
     size : (int, int), optional
-        Width and height of the image in the picture [px]; by default as it is.
+        Width and height of the image in the picture [px]; by default those of the image.
     rgb : bool
         The order of the image's channels: RGB, or BGR.
 
@@ -241,9 +241,9 @@ def draw_marks(
     picture : array of uint8, (h, w, 3)
         Changed.
     marks : Marks
-        In pixels of the image that was scaled to the picture.
+        Pixels in the image before scaling.
     scale : (float, float)
-        Pixels of the picture for a pixel of the image, along x and y.
+        Pixels of the picture per pixel of the image, along x and y.
     unit : float, optional
         Size of the marks relative to those in a picture 640 pixels wide; by default it grows with
         the picture.
@@ -309,7 +309,7 @@ def _status_size(width: int) -> int:
 
 
 def _shortened(text: str, room: int, size: int) -> str:
-    """The text, its end left away if it is too wide."""
+    """The text, shortened at the end if it is too wide."""
     if text_width(text, size) <= room:
         return text
     while text and text_width(text + "…", size) > room:
@@ -327,7 +327,7 @@ def _thousands(number: int) -> str:
 
 # ---- many marks at a time ------------------------------------------------------------------------
 def _in_picture(places: Pixels, scale: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Pixels of the picture, (n, k, 2); rows may hold one place (2) or the two of a line (4)."""
+    """Pixels of the picture, (n, k, 2); each row has one point (2) or the two of a line (4)."""
     rows = np.asarray(places, np.float64)
     split = rows.reshape(len(rows), rows.shape[1] // 2, 2)
     split = split[np.isfinite(split).all(axis=(1, 2))]
@@ -352,5 +352,5 @@ def _polylines(
 def _dots(
     picture: ByteArray, places: npt.NDArray[np.float64], colour: Colour, radius: float
 ) -> None:
-    """Fill a disc at each place (n, 1, 2): a line from there to there, thick and round."""
+    """Draw a disc at each point (n, 1, 2), as a thick line of length 0 with round ends."""
     _polylines(picture, places, colour, max(2, round(2 * radius)), closed=True)

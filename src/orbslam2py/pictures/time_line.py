@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What became of the images over time, as a picture. Plain arrays in."""
+"""The states of the images over time, as a picture. Plain arrays in."""
 
 from __future__ import annotations
 
@@ -42,26 +42,26 @@ def _no_times() -> FloatArray:
 
 @dataclass(frozen=True)
 class History:
-    """What became of the images so far."""
+    """The states of the images so far."""
 
     seconds: FloatArray = field(default_factory=_no_times)
     """(n,) since the first image of the recording, ascending."""
     states: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """(n,) `TrackingState`, `NOT_USED` or `WANDERING`."""
     inliers: FloatArray = field(default_factory=_no_times)
-    """(n,) matches that the pose was accepted with."""
+    """(n,) numbers of inliers of the poses."""
     milliseconds: FloatArray = field(default_factory=_no_times)
     """(n,) that tracking took."""
     keyframes: FloatArray = field(default_factory=_no_times)
-    """(k,) seconds of the images that became keyframes."""
+    """(k,) seconds of the keyframes."""
     loops: FloatArray = field(default_factory=_no_times)
-    """(l,) seconds of the images with which loops were closed."""
+    """(l,) seconds of the loop closures."""
     duration: float | None = None
-    """Seconds of the whole recording; None if nobody knows."""
+    """Length of the whole recording in seconds; None if unknown."""
 
 
 class GrowingHistory:
-    """Gathers a `History`, image by image.
+    """Collects a `History`, image by image.
 
     Parameters
     ----------
@@ -77,21 +77,21 @@ class GrowingHistory:
         self._loops: list[float] = []
 
     def add(self, record: TrackingRecord, *, wanders: bool = False) -> None:
-        """Continue with an image that was tracked, or that this was tried with."""
+        """Add an image that was processed by tracking."""
         state = WANDERING if wanders else int(record.state)
         took = record.milliseconds.get("track", 0.0)
         self._append(record.timestamp, state, record.n_inliers, took, record.is_keyframe)
 
     def add_unused(self, timestamp: float) -> None:
-        """Continue with an image that was not used."""
+        """Add an image that was not used."""
         self._append(timestamp, NOT_USED, 0, 0.0, False)
 
     def add_loop(self, timestamp: float) -> None:
-        """Note a loop that was closed with the image of a time [s]."""
+        """Add a loop that was closed at the image of a time [s]."""
         self._loops.append(timestamp)
 
     def picture(self) -> History:
-        """All of it so far."""
+        """Return the history so far."""
         seconds, states, inliers, milliseconds, is_keyframe = self._rows[: self._n].T
         begin = self._begin or 0.0
         return History(
@@ -266,7 +266,7 @@ def _fill(picture: ByteArray, corners: FloatArray, colour: tuple[int, ...]) -> N
 
 
 def _round_up(number: float) -> float:
-    """The next of 50, 100, 200, 500 ..., so that the axis seldom changes."""
+    """Return the next of 50, 100, 200, 500 ..., so that the axis rarely changes."""
     power = 10.0 ** np.floor(np.log10(max(number, 10.0)))
     return float(min(f * power for f in (1, 2, 5, 10) if f * power >= number))
 

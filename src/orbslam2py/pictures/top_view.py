@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map from above, as a picture. Plain arrays in: nothing here knows a running system.
+"""The map from above, as a picture. It uses plain arrays, and does not depend on a running system.
 
-Right is x, up is z of the world: the first camera looks up the picture.
+Right is x, up is z of the world: the first camera looks towards the top of the picture.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ def _no_gaps() -> npt.NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class MapPicture:
-    """What is to be drawn, in world coordinates [m] (one camera: the map's own units)."""
+    """The contents of the picture, in world coordinates [m] (one camera: the map's own units)."""
 
     points: npt.NDArray[np.floating] = field(default_factory=_no_places)
     """(p, 3) map points."""
     local_points: npt.NDArray[np.floating] = field(default_factory=_no_places)
-    """(l, 3) those around the camera, lit up."""
+    """(l, 3) the points around the camera, highlighted."""
     keyframes: npt.NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 4, 4)))
     """(k, 4, 4) camera to world."""
     covisibility: npt.NDArray[np.floating] = field(default_factory=_no_edges)
@@ -72,15 +72,15 @@ class MapPicture:
     path: FloatArray = field(default_factory=_no_places)
     """(n, 3) camera positions so far."""
     path_gaps: npt.NDArray[np.bool_] = field(default_factory=_no_gaps)
-    """(n,) whether the path is interrupted before each; empty: nowhere."""
+    """(n,) whether the trajectory is interrupted before each; empty: nowhere."""
     truth: FloatArray = field(default_factory=_no_places)
     """(t, 3) true path, aligned."""
 
 
 def bounds(picture: MapPicture) -> tuple[FloatArray, FloatArray]:
-    """Box (low, high) in the plane of what is to be seen: the path, and the points around it.
+    """Return the box (low, high) of the visible part: the trajectory, and the points around it.
 
-    Points so far away that they would shrink the path to a dot do not count.
+    Points that are too far away do not count, because the trajectory would become a dot.
     """
     cameras = [picture.path, picture.keyframes[:, :3, 3], picture.truth]
     places = np.concatenate([each[:, [0, 2]] for each in cameras])
@@ -115,17 +115,17 @@ def draw_top_view(
     scene : MapPicture
         What there is.
     framing : Framing
-        Which part of it is seen, in which size.
+        The visible part of the map, and its scale.
     T_wc : array of float64, (4, 4), optional
-        Where the camera is, or was when it was lost.
+        Position of the camera, or its last position before the loss.
     lost : bool
-        The camera is not known to be there.
+        The present position of the camera is unknown.
     unit : str
         Unit of length, for the scale bar.
     text : int
         Height of the letters [px]; lines and marks grow with it.
     ground : array of uint8, (h, w, 3), optional
-        What `draw_ground` has drawn before, with the same framing; stays as it is.
+        The earlier result of `draw_ground`, with the same framing; it is not changed.
 
     Returns
     -------
@@ -152,9 +152,9 @@ def draw_top_view(
 
 
 def draw_ground(scene: MapPicture, framing: Framing, *, text: int = 14) -> ByteArray:
-    """Draw what lies below: points, covisibility, ground truth and keyframes.
+    """Draw the background: points, covisibility, ground truth and keyframes.
 
-    It takes the most time, and little of it changes from image to image.
+    It takes the most time, and changes little from image to image.
     """
     size = text / 14.0
     thin = max(1, round(size))
@@ -176,7 +176,7 @@ def nice_length(at_most: float) -> float:
 
 # ---- layers --------------------------------------------------------------------------------------
 def _draw_points(points: npt.NDArray[np.floating], framing: Framing) -> ByteArray:
-    """The ground: points as density."""
+    """Draw the background: the density of points."""
     density = _density(points, framing)
     # A single point can be seen, and thousands on a pixel do not outshine the rest.
     return np.asarray(cv2.LUT(cv2.merge([density] * 3), _POINT_COLOURS), np.uint8)
@@ -191,7 +191,7 @@ def _light_up(picture: ByteArray, points: npt.NDArray[np.floating], framing: Fra
 
 
 def _density(points: npt.NDArray[np.floating], framing: Framing) -> ByteArray:
-    """Points a pixel, a little blurred, in 1 / `_PER_POINT`, (h, w)."""
+    """Return points per pixel, slightly blurred, in 1 / `_PER_POINT`, (h, w)."""
     width, height = framing.size
     pixels = np.rint(framing.to_pixels(points[:, [0, 2]]))
     seen = ((pixels >= 0) & (pixels < (width, height))).all(axis=1)
@@ -271,7 +271,7 @@ def _draw_scale_bar(picture: ByteArray, framing: Framing, unit: str, text: int) 
 
 
 def _draw_legend(picture: ByteArray, scene: MapPicture, text: int) -> None:
-    """Names of the lines that there are, in the upper left corner."""
+    """Draw the legend of the existing lines, in the upper left corner."""
     names = [("keyframes", KEYFRAME), ("covisibility", COVISIBILITY), ("path", PATH)]
     if len(scene.loop_edges):
         names.append(("loops", LOOP))
@@ -290,7 +290,7 @@ def _draw_legend(picture: ByteArray, scene: MapPicture, text: int) -> None:
 
 # ---- many lines at a time ------------------------------------------------------------------------
 def _wedges(T_wc: npt.NDArray[np.floating], framing: Framing, length: float) -> FloatArray:
-    """Cameras from above, (k, 3, 2) pixels, of one length on the picture."""
+    """Return cameras from above, (k, 3, 2) pixels, of equal size in the picture."""
     ahead = T_wc[:, [0, 2], 2] * (1.0, -1.0)
     # One that looks up or down has no direction from above: it becomes small, not wild.
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 0.3)

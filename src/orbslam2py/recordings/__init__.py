@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was seen of a run, kept in files: videos, and recordings to be scrubbed through."""
+"""Files that record a run: videos, and recordings for the Rerun viewer."""
 
 from orbslam2py.recordings.rerun_recorder import RerunRecorder
 from orbslam2py.recordings.video import VideoWriter

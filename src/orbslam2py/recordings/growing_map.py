@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map as far as it is known to who watches, and the path of the camera through it."""
+"""The map as known to a watcher, and the trajectory of the camera in it."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _NO_EDGES = np.zeros((0, 2), np.int64)
 
 
 class GrowingMap:
-    """Takes over what changes, and tells how the whole looks from above.
+    """Applies the changes of a map, and returns the contents of its top view.
 
-    Everything is kept in arrays whose index is the id: ids are given in order, and few die.
+    The index of all arrays is the id: ids are assigned in order, and few are removed.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class GrowingMap:
         return self._points.count
 
     def apply(self, changes: MapChanges) -> None:
-        """Take over what has changed."""
+        """Apply the changes."""
         if changes.restarted:
             later = self._path.of_map(changes.map_index)
             self._forget()
@@ -65,20 +65,21 @@ class GrowingMap:
         self._path.hang(self._poses)
 
     def add_frame(self, record: TrackingRecord) -> None:
-        """Continue the path by a frame, with a pose or without."""
+        """Add a frame to the trajectory, with or without a pose."""
         self._path.add(record)
         if record.map_index == self.map_index:
             self._path.hang(self._poses)
 
     def picture(self, local_points: IntArray | None = None, *, renew: bool = True) -> MapPicture:
-        """Tell the whole as it is now.
+        """Return the present contents.
 
         Parameters
         ----------
         local_points : array of int64, (l,), optional
-            Ids of points to be lit up.
+            Ids of the highlighted points.
         renew : bool
-            Points, keyframes and covisibility too, else these are as in the last picture.
+            Whether to update points, keyframes and covisibility; otherwise they are those of the
+            last picture.
         """
         if renew or self._told is None:
             self._told = MapPicture(
@@ -96,20 +97,20 @@ class GrowingMap:
         )
 
     def path(self) -> tuple[FloatArray, FloatArray]:
-        """The path so far, as the map is now: time stamps (n,) in seconds, positions (n, 3)."""
+        """Return the trajectory in the present map: time stamps (n,) [s], positions (n, 3)."""
         positions, _ = self._path.positions(self.map_index, self._poses)
         return self._path.times(self.map_index), positions
 
     def points_between(self, first: int, end: int) -> npt.NDArray[np.floating]:
-        """Positions (p, 3) of the points with ids from `first` to before `end`."""
+        """Return positions (p, 3) of the points with ids from `first` to before `end`."""
         return self._points.between(first, end)
 
     def keyframes_between(self, first: int, end: int) -> npt.NDArray[np.floating]:
-        """Poses (k, 4, 4), camera to world, of the keyframes with such ids."""
+        """Return poses (k, 4, 4), camera to world, of the keyframes with these ids."""
         return self._poses.between(first, end).reshape(-1, 4, 4)
 
     def _edges(self, pairs: IntArray) -> npt.NDArray[np.floating]:
-        """Positions of both ends (e, 2, 3) of pairs of keyframes."""
+        """Return positions of both ends (e, 2, 3) of pairs of keyframes."""
         known = self._poses.holds(pairs).all(axis=1)
         ends: npt.NDArray[np.floating] = self._poses.rows(pairs[known].ravel())[
             :, [3, 7, 11]
@@ -161,7 +162,7 @@ class _Table:
 
 
 class _Path:
-    """Where every frame was, as seen from its reference keyframe, so that it follows the map."""
+    """Poses of all frames relative to their reference keyframes, so that they follow the map."""
 
     def __init__(self) -> None:
         self._n = 0
@@ -183,7 +184,7 @@ class _Path:
         self._n += 1
 
     def of_map(self, map_index: int) -> _Path:
-        """The frames of one map; those of others are forgotten."""
+        """The frames of one map; those of others are dropped."""
         chosen = np.flatnonzero(self._marks[: self._n, 0] == map_index)
         path = _Path()
         path._n = len(chosen)
@@ -194,13 +195,13 @@ class _Path:
         return path
 
     def hang(self, poses: _Table) -> None:
-        """Hang frames on their keyframes, as soon as these are known."""
+        """Attach frames to their keyframes, as soon as these are known."""
         marks = self._marks[: self._n]
         waiting = np.flatnonzero((marks[:, 2] == 0) & poses.holds(marks[:, 1]))
         self._relate(waiting, poses)
 
     def hang_on_parents(self, removed: IntArray, poses: _Table, parents: _Table) -> None:
-        """Hang frames on the parents of keyframes that are about to be removed."""
+        """Attach frames to the parents of keyframes that will be removed."""
         if not len(removed):
             return
         marks = self._marks[: self._n]
@@ -226,13 +227,13 @@ class _Path:
         return np.asarray(turned + T_wk[:, :3, 3], np.float64)
 
     def times(self, map_index: int) -> FloatArray:
-        """Time stamps (n,) that belong to `positions`."""
+        """Return the time stamps (n,) of `positions`."""
         found = self._marks[: self._n, 0] == map_index
         found &= np.isfinite(self._places[: self._n, 0])
         return np.array(self._seconds[: self._n][found])
 
     def positions(self, map_index: int, poses: _Table) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Positions (n, 3) of the frames of a map that have one; whether there is a gap before."""
+        """Return positions (n, 3) of a map's frames with a pose, and the gaps before them."""
         marks = self._marks[: self._n]
         places = self._places[: self._n, :3].copy()
         hung = np.flatnonzero(marks[:, 2] == 1)

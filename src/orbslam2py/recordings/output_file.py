@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A file that grows for as long as a run takes, and appears when it is whole."""
+"""A file that grows during a run, and appears when it is complete."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ RESERVE = 32 * 2**20
 
 
 class OutputFile:
-    """A hidden file beside the one that it becomes.
+    """A hidden file that gets its name at the end.
 
-    The disk is never filled to the brim: the last part of such a file is what makes it readable.
+    Some space of the disk is reserved, because such a file is readable only with its last part.
 
     Parameters
     ----------
     path : str or Path
         What it becomes.
     what : str
-        What messages call it: "video".
+        Its name in messages: "video".
     suffixes : iterable of str
-        Endings that the name may have, in lower case.
+        Allowed suffixes of the name, in lower case.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class OutputFile:
     Raises
     ------
     OutputFileError
-        If it is already certain that the file cannot be written.
+        If the file certainly cannot be written.
     """
 
     def __init__(self, path: str | os.PathLike[str], what: str, suffixes: Iterable[str]) -> None:
@@ -56,12 +56,12 @@ class OutputFile:
         self.require_room()
 
     def require_room(self) -> None:
-        """See that there is room for more.
+        """Check that there is space for more.
 
         Raises
         ------
         OutputFileError
-            If the disk is all but full.
+            If the disk is nearly full.
         """
         try:
             free = shutil.disk_usage(self._target.parent).free
@@ -78,7 +78,7 @@ class OutputFile:
         return OutputFileError(f"cannot write the {self._what} {self.path}: {why}")
 
     def publish(self) -> None:
-        """Give it its name; a file that was there is replaced, and leaves its permissions.
+        """Give the file its name; it replaces an existing file and keeps its permissions.
 
         Raises
         ------
@@ -92,7 +92,7 @@ class OutputFile:
             raise self.error(reason_of(error)) from error
 
     def discard(self) -> None:
-        """Remove what was written and has no name."""
+        """Remove the unfinished file."""
         with contextlib.suppress(OSError):
             self.temporary.unlink()
 

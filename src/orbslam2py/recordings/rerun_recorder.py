@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A recording of a run for Rerun's viewer, to be scrubbed through: images, map, plots, events."""
+"""A recording of a run for Rerun's viewer: images, map, plots, events."""
 
 from __future__ import annotations
 
@@ -58,28 +58,28 @@ _CORNERS = np.array([(-1, -0.75, 1.2), (1, -0.75, 1.2), (1, 0.75, 1.2), (-1, 0.7
 
 
 class RerunRecorder:
-    """Writes all that can be seen of a run into a file for `Rerun <https://rerun.io>`_'s viewer.
+    """Writes all data of a run into a file for `Rerun <https://rerun.io>`_'s viewer.
 
-    Nothing is sent anywhere: the recording goes to the file alone. Needs
-    ``pip install "orbslam2py[rerun]"``.
+    Nothing is sent: the recording is written only to the file. Needs ``pip install
+    "orbslam2py[rerun]"``.
 
     Parameters
     ----------
     path : str or Path
-        Ends with ``.rrd``. The file appears when it is whole; one that was there is replaced.
+        Ends with ``.rrd``. The file appears when it is complete; it replaces an existing one.
     settings : Settings, optional
         For the shape of the camera.
     ground_truth : Trajectory, optional
-        Laid beside the estimate as it grows.
+        Ground truth, aligned with the estimate as it grows.
     with_scale : bool
-        The map has a unit of its own (a single camera): scale the truth to it.
+        Whether the map has its own unit (a single camera): then the ground truth is scaled to it.
 
     Raises
     ------
     OrbSlamError
         If Rerun is not installed.
     OutputFileError
-        If it is already certain that there will be no file.
+        If the file certainly cannot be written.
     """
 
     name = "the recording"
@@ -113,7 +113,7 @@ class RerunRecorder:
 
     # ---- notifications ---------------------------------------------------------------------------
     def on_map(self, changes: MapChanges) -> None:
-        """Take over what has changed; it is written a few times a second."""
+        """Store the changes; they are written several times a second."""
         if changes.restarted:
             if self._n_records:
                 self._log("world/map", self._rr.Clear(recursive=True))
@@ -130,7 +130,7 @@ class RerunRecorder:
         self._say(text, level)
 
     def on_frame(self, view: FrameView) -> None:
-        """Write an image and what was found in it."""
+        """Write an image and its keypoints."""
         for record in view.earlier:
             self._take(record)
         self._take(view.record)
@@ -146,7 +146,7 @@ class RerunRecorder:
             self._write_paths()
 
     def close(self) -> None:
-        """Finish the file; it appears under its name."""
+        """Finish the file and give it its name."""
         if self._closed:
             return
         self._closed = True
@@ -191,7 +191,7 @@ class RerunRecorder:
         self._stream.log(entity, what)
 
     def _take(self, record: TrackingRecord) -> None:
-        """Go on to the time of an image, and write its figures and its pose."""
+        """Set the time to that of an image, and write its figures and its pose."""
         rr = self._rr
         if self._begin is None:
             self._begin = record.timestamp
@@ -263,7 +263,7 @@ class RerunRecorder:
         self._log(entity, lines)
 
     def _camera_size(self) -> float:
-        """Half width of a keyframe's shape: what looks right beside the path."""
+        """Return half the width of a keyframe's shape, relative to the trajectory."""
         T_wc = self._map.picture(renew=False).keyframes[:, :3, 3]
         steps = np.linalg.norm(np.diff(T_wc, axis=0), axis=1)
         return float(0.3 * np.median(steps)) if len(steps) else 0.05
@@ -295,7 +295,7 @@ def _layout() -> object:
 
 
 def _px(width: float) -> float:
-    """A radius in pixels of the screen: negative ones are such."""
+    """Return a radius in pixels of the screen, which Rerun marks by a negative sign."""
     return -width
 
 
@@ -328,7 +328,7 @@ def _as_jpeg(image: ByteArray) -> bytes:
 
 
 def _camera_shapes(T_wc: npt.NDArray[np.floating], size: float) -> list[FloatArray]:
-    """One line a camera (9, 3), world, around what it sees."""
+    """Return one line per camera (9, 3), world, around its view."""
     apex = np.zeros(3)
     a, b, c, d = size * _CORNERS
     corners = np.array([apex, a, b, apex, c, d, apex, b, c, d, a])
@@ -337,7 +337,7 @@ def _camera_shapes(T_wc: npt.NDArray[np.floating], size: float) -> list[FloatArr
 
 
 def _in_words(event: Event) -> tuple[str, str]:
-    """What has happened, and how much that matters."""
+    """Return the text of an event, and its level."""
     level = "WARN"
     if isinstance(event, LoopClosed):
         moved = f"{event.translation:.3g} and {event.rotation_deg:.2g} degrees"

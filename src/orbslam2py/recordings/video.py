@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A video of a run: the image with its keypoints, the map from above, what happened when."""
+"""A video of a run: the image with its keypoints, the map from above, a time line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _DRAWN_AT_ONCE = 4000
 
 
 class VideoWriter:
-    """Writes what a system sees and makes of it into a video file, without a screen.
+    """Writes images and results of a system into a video file, without a screen.
 
     >>> with orb.System("tum1", "rgbd") as slam:  # doctest: +SKIP
     ...     video = orb.VideoWriter("desk.mp4")
@@ -52,26 +52,27 @@ class VideoWriter:
     ----------
     path : str or Path
         Ends with ``.mp4``, ``.mov``, ``.mkv``, ``.avi`` or ``.webm``. The file appears when it is
-        whole; one that was there is replaced.
+        complete; it replaces an existing one.
     frames_per_second : float
-        How fast it is played: the rate of the recording.
+        Frames per second of the video: the rate of the recording.
     duration : float, optional
-        Seconds of the whole recording, for the time line; without, it grows.
+        Length of the whole recording in seconds, for the time line; without it, the time line
+        grows.
     in_time : bool
-        Images may be missing, as in real time: a picture stays until the next one. Otherwise there
-        is one picture for each image.
+        Whether images may be missing, as in real time: then a picture stays until the next one.
+        Otherwise there is one picture for each image.
     unit : str
         Unit of length: "m", or "units" with a single camera, whose map has its own.
     ground_truth : Trajectory, optional
-        Laid beside the path in the map, as far as it has come.
+        Ground truth, drawn beside the trajectory up to the present time.
     size : (int, int)
         Width and height of the video [px], both even and at least 320 and 240.
 
     Raises
     ------
     OutputFileError
-        If it is already certain that there will be no video, or if a size, a rate, a duration or
-        a true path is none.
+        If the video certainly cannot be written, or if a size, a rate, a duration or a ground truth
+        is invalid.
     """
 
     name = "the video"
@@ -131,18 +132,18 @@ class VideoWriter:
 
     @property
     def n_frames(self) -> int:
-        """Pictures in the video so far."""
+        """Number of pictures in the video so far."""
         return self._file.n_frames
 
     def add_unused(self, position: int, timestamp: float, reason: str) -> None:
-        """Show that an image could not be used: the picture before it once more.
+        """Show that an image could not be used: repeat the picture before it.
 
         May be called from any thread, before the next image is tracked.
 
         Parameters
         ----------
         position : int
-            How many images were tracked before.
+            Number of images that were tracked before.
         timestamp : float
             Its time [s].
         reason : str
@@ -153,7 +154,7 @@ class VideoWriter:
 
     # ---- notifications ---------------------------------------------------------------------------
     def on_map(self, changes: MapChanges) -> None:
-        """Take over what has changed."""
+        """Apply the changes."""
         self._map.apply(changes)
 
     def on_event(self, event: Event) -> None:
@@ -179,7 +180,7 @@ class VideoWriter:
         self._write(self._composition)
 
     def close(self) -> None:
-        """Finish the file; it appears under its name."""
+        """Finish the file and give it its name."""
         try:
             self._show_unused()
         finally:
@@ -210,7 +211,7 @@ class VideoWriter:
         self._shown = draw_overlay(view.image, _marks(view), size=composition.image.size)
 
     def _rate(self, view: FrameView) -> float | None:
-        """Images a second: those tracked, or those of the recording, which waits for its video."""
+        """Images per second: tracked ones, or those of the recording if it waits for the video."""
         if self._in_time:
             return view.queue.frames_per_second or None
         self._times.append(view.record.timestamp)
@@ -218,7 +219,7 @@ class VideoWriter:
         return (len(self._times) - 1) / seconds if seconds > 0 else None
 
     def _show_unused(self) -> None:
-        """Show the images that could not be used, as far as their turn has come."""
+        """Show the unusable images up to the present one."""
         if self._composition is None:
             return
         with self._lock:
@@ -275,7 +276,7 @@ class VideoWriter:
         )
 
     def _catch_up(self, timestamp: float) -> None:
-        """Repeat the last picture for the time until an image came."""
+        """Repeat the last picture for the time until an image."""
         if self._picture is None or self._begin is None:
             self._begin = timestamp
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures into a video file, by the FFmpeg that OpenCV brings along."""
+"""Pictures into a video file, by the FFmpeg in OpenCV."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ class VideoFile:
     ----------
     path : str or Path
         Ends with ``.mp4``, ``.mov``, ``.mkv``, ``.avi`` or ``.webm``. It appears when it is closed;
-        a file that was there is replaced.
+        it replaces an existing file.
     size : (int, int)
         Width and height of the pictures [px], both even.
     frames_per_second : float
-        How fast it is played.
+        Frames per second.
 
     Raises
     ------
     OutputFileError
-        If it is already certain that there will be no video.
+        If the video certainly cannot be written.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class VideoFile:
         Raises
         ------
         OutputFileError
-            If the disk is about to be full. What was written stays: close the file.
+            If the disk is nearly full. The pictures so far are kept: close the file.
         """
         if self.n_frames % _LOOK == 0:
             self._file.require_room()
@@ -80,7 +80,7 @@ class VideoFile:
         Raises
         ------
         OutputFileError
-            If it has not become a video; a file that was there before is kept.
+            If it is not a valid video; an existing file is kept.
         """
         if not self._open:
             return

@@ -49,29 +49,29 @@ class _MovedPair:
 
 
 class CalibrationWatch:
-    """Looks at the first images of a run, after they were tracked, and warns once.
+    """Checks the first images of a run after tracking, and warns once.
 
-    It takes images only and touches nothing of the system.
+    It only reads images and does not change the system.
 
     Parameters
     ----------
     settings : Settings
         The calibration that is used.
     sensor : Sensor
-        What the images come from.
+        The sensor.
     known : Settings, optional
-        The calibration that comes with the images, if one does.
+        The calibration beside the images, if there is one.
     in_background : bool
-        Judge the points in a thread of its own, since the next image does not wait.
+        Judge the points in a separate thread, because the next image does not wait.
     thresholds : FitThresholds, optional
         The limits.
 
     Attributes
     ----------
     rows : list of PairRows
-        What the first pairs of a stereo camera said.
+        Result of the first pairs of a stereo camera.
     gains : CalibrationGains or None
-        What the points said, when they have been judged.
+        Result of the points, once they have been judged.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class CalibrationWatch:
         self._done = False
 
     def look(self, images: Images) -> None:
-        """Take the next images of the run; they have been tracked, so they are good ones."""
+        """Check the next images of the run; they have been tracked, so they are valid."""
         if self._done:
             return
         images = self._as_tracked(images)
@@ -113,7 +113,7 @@ class CalibrationWatch:
             self._judge()
 
     def finish(self) -> Misfit | None:
-        """Judge what there is, if fewer images came, and say what did not fit."""
+        """Judge the images so far, if fewer came, and report what did not fit."""
         if not self._done:
             self._judge()
         if self._thread is not None:
@@ -225,7 +225,7 @@ class CalibrationWatch:
 
 
 def settings_beside(source: object) -> Settings | None:
-    """Return the calibration that comes with the images, whichever is used; None if none does."""
+    """Return the calibration beside the images, even if it is not used; None if there is none."""
     default = getattr(source, "default_settings", None)
     if default is None:
         return None
@@ -243,7 +243,7 @@ def check_calibration(
     *,
     thresholds: FitThresholds | None = None,
 ) -> Misfit | None:
-    """Look at the first images of a sequence and judge whether a calibration fits them.
+    """Check whether a calibration fits the first images of a sequence.
 
     The same as `orbslam2py.run_sequence` does on the way: size and middle of the images, what is
     known of the data set, the rows of a stereo pair, and whether another focal length or lens
@@ -261,14 +261,13 @@ def check_calibration(
     Returns
     -------
     Misfit or None
-        What was seen, its likely cause and the remedy, also as text; None if nothing speaks
-        against the calibration. That is no proof: a camera that moves straight on does not tell
-        its focal length.
+        The observation, its likely cause and the remedy, also as text; None if nothing contradicts
+        the calibration. None is no proof: straight motion does not show a wrong focal length.
 
     Raises
     ------
     StateError
-        If the source was opened for another sensor than the settings are for.
+        If the sensors of the source and of the settings differ.
     SettingsError
         If there are no settings, or they cannot be read.
     DatasetError, ImageError
@@ -291,7 +290,7 @@ def check_calibration(
 
 
 def _settings_for(source: object, choice: Settings | str | Path | None) -> Settings:
-    """Settings that were given, or come with the images."""
+    """Return the given settings, or those beside the images."""
     choice = getattr(source, "settings", None) if choice is None else choice
     if choice is None:
         raise SettingsError(

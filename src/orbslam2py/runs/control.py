@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run that somebody else may hold, step through and end."""
+"""Control of a run from another thread: pause, step, stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _WAIT_SLICE = 0.1
 
 
 class RunControl:
-    """What another thread may ask of a run: to stop, to stand still, to take one frame.
+    """Requests of another thread to a run: stop, pause, process one frame.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class RunControl:
     Attributes
     ----------
     stop : threading.Event
-        The same, or a new one.
+        The event, or a new one.
     """
 
     def __init__(self, stop: threading.Event | None = None) -> None:
@@ -32,11 +32,11 @@ class RunControl:
 
     @property
     def paused(self) -> bool:
-        """Whether the run stands still, or will after the present frame."""
+        """Whether the run is paused, or will be after the present frame."""
         return self._paused
 
     def pause(self) -> None:
-        """Let the run stand still after the present frame."""
+        """Pause the run after the present frame."""
         with self._condition:
             self._paused, self._steps = True, 0
 
@@ -47,14 +47,14 @@ class RunControl:
             self._condition.notify_all()
 
     def step(self) -> None:
-        """Take one frame and stand still again."""
+        """Process one frame and pause again."""
         with self._condition:
             self._paused = True
             self._steps += 1
             self._condition.notify_all()
 
     def wait(self) -> float:
-        """Stand still while the run is paused; returns for how long [s]."""
+        """Wait while the run is paused; returns for how long [s]."""
         if not self._paused:
             return 0.0
         begin = time.perf_counter()

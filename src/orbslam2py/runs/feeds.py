@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames one after the other, from a recording or a camera, as a run takes them."""
+"""Frames of a recording or a camera, in the order of a run."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ class FedFrame:
     Attributes
     ----------
     index
-        Place in the sequence, from 0, whichever of its frames the run takes; for a camera the
-        number of images taken before.
+        Number in the sequence, from 0, also if the run skips frames; for a camera the number of
+        images before.
     timestamp, text
-        Time stamp in seconds, as a number and as the source wrote it.
+        Time stamp in seconds, as a number and as text of the source.
     item
         The images; an exception if they could not be read.
     is_dropped
@@ -67,7 +67,7 @@ class RecordedFeed:
     sequence : Sequence
         Images and time stamps.
     indices : list of int
-        Places in the sequence of the frames to take, in order.
+        Numbers of the frames in the sequence, in order.
     realtime : bool
         Play the time stamps, and drop frames that are overtaken.
     imu : ImuOfRun, optional
@@ -100,14 +100,14 @@ class RecordedFeed:
         self._text(indices[0])
 
     def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
-        """Yield the frames, at the time they are due if real time is played, until `stop` is set.
+        """Yield the frames, in real time at their due times, until `stop` is set.
 
-        Frames that cannot be read carry their error.
+        Unreadable frames contain their error.
 
         Raises
         ------
         DatasetError
-            If the sequence gives something else than images, or than text for a time stamp.
+            If the sequence gives objects that are no images, or time stamps that are no text.
         """
         sequence = self._sequence
         clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
@@ -129,20 +129,20 @@ class RecordedFeed:
         return _time_text(self._sequence.timestamp_text(index), f"timestamp_text({index})")
 
     def delay(self, seconds: float) -> None:
-        """Nobody has asked for frames for so long: those that come next are due so much later."""
+        """Add a pause to the due times of the next frames."""
         if self._clock is not None:
             self._clock.delay(seconds)
 
 
 class LiveFeed:
-    """Images of a camera, the newest one whenever one is asked for.
+    """Images of a camera; each request gives the newest one.
 
     Parameters
     ----------
     camera : LiveSource
         The images.
     max_frames : int, optional
-        End after this number of frames; else only `stop` ends it.
+        End after this number of frames; otherwise only `stop` ends it.
     """
 
     is_live = True
@@ -154,17 +154,17 @@ class LiveFeed:
 
     @property
     def n_lost(self) -> int:
-        """Images so far that came while an earlier one was worked on."""
+        """Number of images that came while an earlier one was processed."""
         return self._camera.n_dropped
 
     def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
-        """Yield the newest image again and again, until `stop` is set.
+        """Yield the newest image each time, until `stop` is set.
 
         Raises
         ------
         DatasetError
-            If the camera cannot be opened, sends no more images, or something else than images, or
-            than text for a time stamp.
+            If the camera cannot be opened, ends, or gives objects that are no images or time stamps
+            that are no text.
         """
         index = 0
         with self._camera as camera:
@@ -181,18 +181,18 @@ class LiveFeed:
                     index += 1
 
     def delay(self, seconds: float) -> None:
-        """Nothing: a camera goes on."""
+        """Do nothing: a camera continues."""
 
 
 def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
-    """Whether the source is a sequence, which has a known length, and no camera."""
+    """Whether the source is a sequence of known length, not a camera."""
     return hasattr(source, "__len__")
 
 
 def _time_text(text: Any, giver: str) -> str:
-    """See that a time stamp is text with a number: it goes into files as it is.
+    """Check that a time stamp is text with a number: it is written to files unchanged.
 
-    Python reads more as a number than others do, such as blanks and line ends around it.
+    Python accepts more texts as numbers than other programs, for example with spaces and line ends.
     """
     if isinstance(text, str) and _NUMBER.fullmatch(text) and math.isfinite(float(text)):
         return text
@@ -203,7 +203,7 @@ def _time_text(text: Any, giver: str) -> str:
 
 
 class _Clock:
-    """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
+    """Follows time stamps: a frame is dropped if the next one is due before it is taken."""
 
     def __init__(self, timestamps: FloatArray, indices: list[int], stop: threading.Event) -> None:
         self._due = np.asarray(timestamps)[indices]
@@ -211,7 +211,7 @@ class _Clock:
         self._offset: float | None = None
 
     def delay(self, seconds: float) -> None:
-        """Stand still for so long."""
+        """Wait for this time."""
         if self._offset is not None:
             self._offset += seconds
 

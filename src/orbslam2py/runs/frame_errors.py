@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far every frame is from the ground truth, and where that is worst."""
+"""Error of every frame against the ground truth, and its largest values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _N_WORST, _APART = 4, 0.06
 
 
 def position_errors(path: Trajectory, truth: Trajectory, metres: float) -> FloatArray:
-    """Take the distance of every pose to the true one at its time.
+    """Compute the distance of every pose to the true one at its time.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def position_errors(path: Trajectory, truth: Trajectory, metres: float) -> Float
     Returns
     -------
     array of float64, (n,)
-        Metres for every pose of `path`, nan where there is no true one.
+        Metres for every pose of `path`, nan without a true pose.
     """
     errors = np.full(len(path), np.nan)
     i, j = associate(path.timestamps, truth.timestamps, MAX_DIFFERENCE)
@@ -36,17 +36,17 @@ def position_errors(path: Trajectory, truth: Trajectory, metres: float) -> Float
 
 
 def worst_places(errors: FloatArray) -> IntArray:
-    """Find the largest errors that are some way apart, the largest first.
+    """Find the largest errors with some distance between them, the largest first.
 
     Parameters
     ----------
     errors
-        In the order of the frames, (n,), nan where they are not known.
+        In the order of the frames, (n,), nan if unknown.
 
     Returns
     -------
     array of int64, (k,)
-        Indices; each is the largest error around it, none is below the median.
+        Indices; each is the largest error around it, and none is below the median.
     """
     known = np.isfinite(errors)
     if not known.any():
@@ -67,18 +67,18 @@ def worst_places(errors: FloatArray) -> IntArray:
 
 
 def worst_frames(result: RunResult, evaluation: RunEvaluation) -> IntArray:
-    """Positions in `RunResult.rows` of the worst places of a run, (k,)."""
+    """Positions in `RunResult.rows` of the largest errors of a run, (k,)."""
     path = result.tracked_trajectory()
     return path.indices[worst_places(position_errors(path, evaluation.truth, 1.0))]
 
 
 def truth_of_frames(result: RunResult, evaluation: RunEvaluation) -> tuple[Trajectory, list[str]]:
-    """Take the true pose of every frame that has one, in the estimate's frame and unit.
+    """Return the true poses of frames, in the estimate's frame and unit.
 
     Returns
     -------
     truth, texts
-        Poses at the true poses' own times, and their time stamps for a file, with nanoseconds.
+        Poses at the times of the ground truth, and their time stamps for a file, with nanoseconds.
     """
     times = np.array([float(row.timestamp) for row in result.rows])
     _, j = associate(times, evaluation.truth.timestamps, MAX_DIFFERENCE)

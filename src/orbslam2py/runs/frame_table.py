@@ -61,16 +61,16 @@ def write_frames(path: Path, rows: Iterable[FrameRow]) -> None:
 
 
 def pose_deviation(record: TrackingRecord) -> tuple[float, float] | None:
-    """Take the standard deviation of a pose from its covariance.
+    """Compute the standard deviations of a pose from its covariance.
 
-    The camera's centre is moved by the translation of a perturbation on the left, turned into the
-    world, so that both figures are roots of the trace of a block of the covariance.
+    The camera's centre moves by the translation of a left perturbation, rotated into the world, so
+    both figures are roots of the trace of a block of the covariance.
 
     Returns
     -------
     position, angle
-        Of the camera's centre [m] (one camera: the map's unit) and of its orientation [deg], all
-        directions together; None if they are not known.
+        Standard deviations of the camera's centre [m] (one camera: the map's unit) and of its
+        orientation [deg], over all directions; None if they are not known.
     """
     if record.covariance is None:
         return None

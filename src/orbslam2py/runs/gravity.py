@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which way is up, in the frame of the first keyframe, so that height is height."""
+"""The up direction in the frame of the first keyframe."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LEAST_AGREEMENT = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Height:
-    """The direction in which height is measured, and what that is called."""
+    """The direction of height, and its name."""
 
     up: FloatArray
     """Unit vector (3,) in the frame of the first keyframe's camera."""
@@ -31,22 +31,22 @@ class Height:
 
     @classmethod
     def of_first_keyframe(cls) -> Height:
-        """Take the first camera's own up: nothing tells how it was held."""
+        """Use the first camera's own up direction, if its orientation is unknown."""
         return cls(_UP_IN_CAMERA, "up in the\nfirst keyframe")
 
     def of(self, positions: FloatArray) -> FloatArray:
-        """Height (n,) of positions (n, 3), from the first keyframe's."""
+        """Height (n,) of positions (n, 3) above the first keyframe."""
         return np.asarray(positions @ self.up)
 
 
 def height_of(sequence: Any, estimate: Trajectory, truth: Trajectory | None) -> Height:
-    """Find the direction of gravity from ground truth whose world has a known one.
+    """Find the direction of gravity by a ground truth whose world has a known one.
 
     Parameters
     ----------
     sequence
-        Where the images are from; its ``up_in_truth`` is the direction of up in the world of its
-        ground truth, None or missing if that is not known.
+        The source of the images; its ``up_in_truth`` is the up direction in the world of its ground
+        truth, None or missing if unknown.
     estimate
         Tracked poses.
     truth
@@ -55,7 +55,7 @@ def height_of(sequence: Any, estimate: Trajectory, truth: Trajectory | None) -> 
     Returns
     -------
     Height
-        Along gravity, or along the up of the first keyframe where gravity is not known.
+        Along gravity, or along the up direction of the first keyframe if gravity is unknown.
     """
     up_in_truth = getattr(sequence, "up_in_truth", None)
     if up_in_truth is None or truth is None or not len(estimate):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Folders that a sequence is read from: what a run writes there would be part of the next one."""
+"""Folders that a sequence is read from: results there would become part of the next run."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from orbslam2py.runs.outputs import holds_run
 
 
 def check_not_among_images(output: Path, sequence: object, source: Path | None = None) -> None:
-    """See that results do not come to lie among what the sequence is read from.
+    """Check that results will not be among the files of a sequence.
 
-    The pictures of a run would be taken for frames, and its settings go before any calibration
-    that comes with the images.
+    Otherwise pictures of a run would count as frames, and its settings would replace the
+    calibration beside the images.
 
     Parameters
     ----------
@@ -25,12 +25,12 @@ def check_not_among_images(output: Path, sequence: object, source: Path | None =
     sequence : Sequence or LiveSource
         What is run.
     source : Path, optional
-        Where it is read from; by default what the sequence itself tells (`folder` or `path`).
+        The folder of the sequence; by default from the sequence itself (`folder` or `path`).
 
     Raises
     ------
     DatasetError
-        If it is the sequence's own folder, or one of the folders in it that are read.
+        If it is the sequence's folder, or a folder in it that is read.
     """
     source = _place_of(sequence) if source is None else source
     if source is None or not (source.is_dir() or is_recording(source)):
@@ -62,18 +62,18 @@ def check_not_among_images(output: Path, sequence: object, source: Path | None =
 
 
 def _place_of(sequence: object) -> Path | None:
-    """Where a sequence is on disk; None if it does not tell."""
+    """Return the path of a sequence on disk; None if unknown."""
     places = (getattr(sequence, name, None) for name in ("folder", "path"))
     return next((place for place in places if isinstance(place, Path)), None)
 
 
 def _folders_of_images(sequence: object) -> set[Path]:
-    """The folders that the first image lies in, where a sequence tells it."""
+    """Return the folders of the first image, if the sequence gives its file."""
     path_of = getattr(sequence, "image_path", None)
     first = path_of(0) if callable(path_of) else None
     return set(first.resolve().parents) if isinstance(first, Path) else set()
 
 
 def _is_read(folder: Path) -> bool:
-    """Whether a folder in that of a sequence is likely read: it holds images, and no run."""
+    """Return whether a folder of a sequence is probably read: it has images, and no run."""
     return folder.is_dir() and not holds_run(folder) and bool(image_files(folder))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of a camera, whose images cannot be read again: some are kept small while it runs."""
+"""Images of a camera cannot be read again; some are kept in small size during the run."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _QUALITY = 92
 
 @dataclass(frozen=True, eq=False)
 class SmallImage:
-    """An image as the page shows it."""
+    """A small image for the report page."""
 
     picture: npt.NDArray[np.uint8]
     """(h, w, 3) blue, green, red."""
     scale: float
-    """Its pixels for one of the image."""
+    """Its pixels per pixel of the image."""
 
 
 def shrink(image: ByteArray, *, rgb: bool) -> SmallImage:
@@ -39,7 +39,7 @@ def shrink(image: ByteArray, *, rgb: bool) -> SmallImage:
     Parameters
     ----------
     image
-        uint8 (h, w), (h, w, 3) or (h, w, 4), as a sequence gives it.
+        uint8 (h, w), (h, w, 3) or (h, w, 4), as from a sequence.
     rgb
         The order of its colours.
     """
@@ -58,12 +58,12 @@ def _as_bgr(image: ByteArray, *, rgb: bool) -> npt.NDArray[np.uint8]:
 
 
 class KeptImages:
-    """Keeps images of keyframes, evenly over a run of any length, and of the first losses.
+    """Keeps images of keyframes, evenly distributed over a run, and of the first losses.
 
     Parameters
     ----------
     settings : Settings
-        Of the camera: the order of colours.
+        The camera, for the order of colours.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -75,14 +75,14 @@ class KeptImages:
         self._was_tracked = False
 
     def look(self, position: int, image: ByteArray, record: TrackingRecord) -> None:
-        """Keep the image of a frame, if it is one to keep.
+        """Keep the image of a frame, if it is one of these.
 
         Parameters
         ----------
         position : int
-            Of the frame in `RunResult.rows`.
+            Position of the frame in `RunResult.rows`.
         image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-            As the camera gave it.
+            The image from the camera.
         record : TrackingRecord
             What became of it.
         """
@@ -101,7 +101,7 @@ class KeptImages:
 
     @property
     def positions(self) -> list[int]:
-        """Of the frames whose images are there, ascending."""
+        """Positions of the frames with images, ascending."""
         return sorted({*self._keyframes, *self._lost})
 
     def find(self, position: int) -> SmallImage | None:

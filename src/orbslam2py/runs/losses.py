@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When tracking was lost, for how long, and why."""
+"""Losses of tracking: when, how long, and why."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from orbslam2py.slam.records import TrackingRecord, TrackingState
 
 @dataclass(frozen=True)
 class Loss:
-    """Frames without a pose, from the one in which tracking was lost to the next that has one."""
+    """Frames without a pose, from the loss to the next frame with a pose."""
 
     map_index: int
-    """The map in which it happened."""
+    """The map that was lost."""
     index: int
     """Index in the sequence of the first frame without a pose."""
     timestamp: float
     """Of that frame [s]."""
     reason: str
-    """Why that frame has no pose."""
+    """Why this frame has no pose."""
     n_frames: int
-    """Frames that were looked at in vain, also for the beginning of another map."""
+    """Number of frames without a pose, also while another map was starting."""
     seconds: float
-    """From the first of them to the next pose, or to the last frame if there was none."""
+    """Time from the first of them to the next pose, or to the last frame if there was none."""
     found_again: bool
-    """Whether a pose came later, in the same map or in a new one."""
+    """Whether a later frame had a pose, in the same map or in a new one."""
 
 
 def find_losses(rows: Iterable[FrameRow]) -> list[Loss]:
-    """Find every time at which tracking was lost, in the order of the frames."""
+    """Find every loss of tracking, in the order of the frames."""
     losses: list[Loss] = []
     first: FrameRow | None = None
     waiting: list[TrackingRecord] = []
@@ -69,7 +69,7 @@ def _loss(first: FrameRow, waiting: list[TrackingRecord], found: TrackingRecord 
 
 
 def losses_report(rows: Sequence[FrameRow]) -> dict[str, Any]:
-    """Make the entries of report.json about being lost."""
+    """Make the entries of report.json about losses."""
     losses = find_losses(rows)
     reasons = Counter(
         row.reason
@@ -101,7 +101,7 @@ def loss_entry(loss: Loss) -> dict[str, Any]:
 
 
 def last_loss_warning(losses: Sequence[Loss]) -> str | None:
-    """Say that tracking was lost at the end, why, and what helps; None if it was not."""
+    """Return a message if tracking was lost at the end, with reason and remedy; else None."""
     if not losses or losses[-1].found_again:
         return None
     loss = losses[-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The machine that a run was made on, for its report."""
+"""The computer of a run, for its report."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from orbslam2py._cores import n_cores
 
 
 def describe_machine() -> dict[str, Any]:
-    """Say what the times of a run depend on.
+    """Return the properties of the computer that determine the times of a run.
 
     Returns
     -------
     dict
-        ``system``, ``processor``, ``cores`` (that this process may use), ``memory_gb`` (None if
-        nobody knows), and the versions of ``python``, ``numpy`` and ``opencv``.
+        ``system``, ``processor``, ``cores`` (available to this process), ``memory_gb`` (None if
+        unknown), and the versions of ``python``, ``numpy`` and ``opencv``.
     """
     return {
         "system": f"{platform.system()} {platform.release()} ({platform.machine()})",

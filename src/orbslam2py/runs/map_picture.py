@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture of a saved map, or of several in a file: paths of the runs, keyframes, points."""
+"""The picture of one or more saved maps: trajectories of the runs, keyframes, points."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from orbslam2py.trajectory import Trajectory
 
 
 def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
-    """Draw a saved map into a picture, as seen in the first keyframe's camera.
+    """Draw a saved map into a picture, in the frame of the first keyframe's camera.
 
-    Of several maps each has a part of the picture, a colour and a world of its own.
+    Each of several maps has a separate panel, colour and world.
 
     Parameters
     ----------
     path
-        Where to write; the ending tells the format, and without one it is PNG.
+        The file; its suffix determines the format, PNG without one.
     saved
         The map or maps.
     title
@@ -33,7 +33,7 @@ def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
     Raises
     ------
     OutputFileError
-        If the ending is that of no format of pictures that is known here.
+        If the suffix is of no known format of pictures.
     OSError
         If the file cannot be written.
     """
@@ -66,7 +66,7 @@ def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
 
 
 def _one_after_the_other(paths: list[Trajectory]) -> tuple[FloatArray, np.ndarray]:
-    """Seconds of all poses as if the runs had followed each other, and where there is a gap."""
+    """Return the times of all poses as if the runs were consecutive, and the gaps."""
     seconds, gaps, begin = [], [], 0.0
     for one in paths:
         since = one.timestamps - one.timestamps[0]

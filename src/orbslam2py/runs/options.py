@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run is asked for."""
+"""Options of a run."""
 
 from __future__ import annotations
 
@@ -29,38 +29,39 @@ _OPTION_OF = {"localize_after": "--localize"}
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What to run and how.
+    """What to run, and how.
 
     Raises
     ------
     SettingsError, DatasetError
-        If a value is none that its option may have, or options contradict each other.
+        If a value is invalid, or options contradict each other.
     """
 
     sensor: Sensor
-    """What the images come from."""
+    """The sensor."""
     system: SystemOptions = field(default_factory=SystemOptions)
-    """How the system works. Recorded images always wait for mapping, unless `realtime` is asked
-    for; a camera's never do."""
+    """How the system works. Recorded images always wait for mapping, unless `realtime` is set; a
+    camera's never do."""
     realtime: bool = False
-    """Follow the time stamps and drop frames as a camera would; otherwise every frame is tracked,
-    as fast as possible, waiting for mapping."""
+    """Follow the time stamps and drop late frames, as with a camera; otherwise every frame is
+    tracked, as fast as mapping allows."""
     start: int = 0
     """Index of the first frame."""
     stride: int = 1
-    """Step between the frames that are used: 2 takes every second one."""
+    """Step between the used frames: 2 uses every second one."""
     max_frames: int | None = None
     """Most frames to use."""
     localize_after: int | None = None
-    """Frames before localization mode; 0, in a loaded map: from the first frame on."""
+    """Number of frames before localization mode; 0 in a loaded map: from the first frame on."""
     final_adjustment: bool = False
-    """Refine the finished map as a whole (`System.optimize`) before the results are written."""
+    """Run full bundle adjustment of the finished map (`System.optimize`) before the results are
+    written."""
     load_map: SavedMap | MapFile | None = None
     """Begin in this map."""
     initial_pose: FloatArray | None = None
-    """Where in the loaded map the camera may be, (4, 4) camera to world."""
+    """Likely pose of the camera in the loaded map, (4, 4) camera to world."""
     allow_other_setup: bool = False
-    """Load the map although it was made with another camera or other visual words."""
+    """Load the map even if it was made with another camera or vocabulary."""
     save_map: Path | None = None
     """Save the maps in this file at the end."""
     autosave: float | None = None
@@ -151,12 +152,12 @@ class RunOptions:
             )
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:
-        """How many frames a run over the source will take; None for a camera without an end.
+        """Return how many frames a run will process; None for a camera without a limit.
 
         Raises
         ------
         DatasetError
-            If the options make no sense for the source.
+            If the options do not fit the source.
         """
         if is_sequence(source):
             return len(self.indices(len(source)))
@@ -164,7 +165,7 @@ class RunOptions:
         return self.max_frames
 
     def indices(self, n_frames: int) -> list[int]:
-        """Indices of the frames of a sequence that are used.
+        """Return the indices of the used frames of a sequence.
 
         Raises
         ------
@@ -180,12 +181,12 @@ class RunOptions:
         return indices[: self.max_frames]
 
     def check_for_camera(self) -> None:
-        """See that the options make sense for a camera.
+        """Check that the options fit a camera.
 
         Raises
         ------
         DatasetError
-            Naming the option that does not.
+            The message names the option that does not.
         """
         if self.system.deterministic or self.realtime:
             name = "--deterministic" if self.system.deterministic else "--realtime"
@@ -196,7 +197,7 @@ class RunOptions:
 
 
 def _count_of(value: Any, name: str, least: int) -> int | None:
-    """Take a number of frames; a whole number of NumPy's could not be written to report.json."""
+    """Convert a number of frames to int: report.json cannot hold NumPy's integers."""
     if value is None and name in _MAY_BE_NONE:
         return None
     option = _OPTION_OF.get(name) or f"--{name.replace('_', '-')}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files that a run leaves behind."""
+"""Files of the results of a run."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _RESULTS = (*_NOT_ALWAYS, "points.ply", "map.npz", "report.json", _MARK)
 
 
 def new_output_folder(name: str) -> Path:
-    """A folder that does not exist yet: ``runs/<name>-<time>``, below the working folder."""
+    """Return a new folder: ``runs/<name>-<time>``, below the working folder."""
     stem = Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
     folder = stem
     for number in range(2, 100):
@@ -69,27 +69,27 @@ def new_output_folder(name: str) -> Path:
 
 
 def is_name_of_result(name: str) -> bool:
-    """Whether a run writes a file of that name into its folder."""
+    """Return whether a run writes a file of this name into its folder."""
     return name == _SETTINGS or any(fnmatch.fnmatchcase(name, pattern) for pattern in _RESULTS)
 
 
 def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> Path:
-    """Make the folder that takes the results, and see that it can be written.
+    """Create the folder of the results, and check that it is writable.
 
     Parameters
     ----------
     folder : Path
         The folder.
     force : bool
-        Accept a folder that holds files. Those that are called as results are must be a run's.
+        Accept a folder that contains files. Files with the names of results must be from a run.
     settings : str
-        Text of the settings file that will be written: one that holds it already may be there.
+        Text of the settings file that will be written; an identical file may exist.
 
     Raises
     ------
     DatasetError
-        If it is not empty (without `force`), not a folder, or not writable, or if files that no run
-        has written would be replaced.
+        If it is not empty (without `force`), not a folder, or not writable, or if files that are
+        from no run would be replaced.
     """
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one with --output")
@@ -119,7 +119,7 @@ def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> P
 
 @contextlib.contextmanager
 def sole_writer(folder: Path) -> Iterator[None]:
-    """Keep other runs out of a folder; the lock goes with the process, whatever ends it.
+    """Lock a folder against other runs; the lock ends with the process.
 
     Raises
     ------
@@ -145,10 +145,10 @@ def sole_writer(folder: Path) -> Iterator[None]:
 
 
 def remove_earlier_results(folder: Path) -> None:
-    """Remove the results of an earlier run, so that none looks like one of the run that begins.
+    """Remove the results of an earlier run, so that they do not look like those of the new run.
 
-    Only from a folder in which a run has written, and only what runs write; the settings stay, and
-    so does the table of frames.
+    Only in the folder of a run, and only files that runs write; the settings and the table of
+    frames are kept.
     """
     if not holds_run(folder):
         return
@@ -159,7 +159,7 @@ def remove_earlier_results(folder: Path) -> None:
 
 
 def mark_as_begun(folder: Path) -> None:
-    """Write a table without frames, so that what a run leaves that is killed is known as its own.
+    """Write an empty table, so that the files of a killed run are recognised as such.
 
     Raises
     ------
@@ -175,12 +175,12 @@ def mark_as_begun(folder: Path) -> None:
 
 
 def holds_run(folder: Path) -> bool:
-    """Whether a run has written into a folder."""
+    """Return whether a folder contains a run."""
     return is_frame_table(folder / _MARK)
 
 
 def _is_only_begun(folder: Path) -> bool:
-    """Whether a run that was killed has left nothing but its mark."""
+    """Return whether a killed run has left only its mark."""
     return [path.name for path in folder.iterdir()] == [_MARK] and has_no_frames(folder / _MARK)
 
 
@@ -189,7 +189,7 @@ def _results_in(folder: Path) -> Iterator[Path]:
 
 
 def _other_work(folder: Path, settings: str) -> str | None:
-    """Name of a file that is called as a result is, and is none."""
+    """Return a file with the name of a result that is none."""
     if holds_run(folder):
         return None
     own = folder / _SETTINGS
@@ -199,7 +199,7 @@ def _other_work(folder: Path, settings: str) -> str | None:
 
 
 def link_latest(folder: Path) -> None:
-    """Point ``runs/latest`` to the newest run in ``runs`` (where links are possible)."""
+    """Let ``runs/latest`` link to the newest run in ``runs`` (if links are possible)."""
     link = Path("runs") / "latest"
     if folder.resolve().parent != link.parent.resolve():
         return
@@ -214,7 +214,7 @@ def link_latest(folder: Path) -> None:
 
 
 class OutputWriter:
-    """Writes every result file of a run; one that fails does not hinder the others.
+    """Writes every result file of a run; a failure does not prevent the other files.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class OutputWriter:
         *,
         page: bool = True,
     ) -> None:
-        """Write all files of the run; the page and its images only if they are wanted."""
+        """Write all files of the run; the page and its images only on request."""
         self._write(_MARK, lambda path: write_frames(path, result.rows))
         if has_imu_states(result.rows):
             self._write("imu_states.csv", lambda path: write_imu_states(path, result.rows))
@@ -270,7 +270,7 @@ class OutputWriter:
         self._write("report.html", lambda path: write_report_page(path, folders))
 
     def _remove_stale(self) -> None:
-        """Remove what an earlier run left in the folder and this one has no counterpart of."""
+        """Remove files of an earlier run that this run does not have."""
         for path in (path for name in _NOT_ALWAYS for path in self.folder.glob(name)):
             if path.name not in self._written:
                 with contextlib.suppress(OSError):

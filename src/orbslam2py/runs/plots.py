@@ -57,14 +57,14 @@ def draw_trajectory(
     unit: str = "m",
     height: Height | None = None,
 ) -> None:
-    """Draw the path from above, and how high it goes over time, into a picture.
+    """Draw the trajectory from above, and its height over time, into a picture.
 
-    If the camera went up or down more than forward, the path is drawn as seen from behind.
+    If the camera moved more vertically than forward, the trajectory is drawn from behind.
 
     Parameters
     ----------
     path : Path
-        Where to write; the ending tells the format, and without one it is PNG.
+        The file; its suffix determines the format, PNG without one.
     title, subtitle : str
         Two lines of text above the picture.
     positions : array of float64, (n, 3)
@@ -77,21 +77,20 @@ def draw_trajectory(
     points : array of float64, (p, 3)
         Map points.
     truth : tuple of (seconds, positions), optional
-        Ground truth, aligned to the estimate.
+        Ground truth, aligned with the estimate.
     loops : array of float64, (l, 2, 3), optional
         Positions of the two keyframes of every loop.
     gaps : array of bool, (n,), optional
-        Whether the path is interrupted before each position; by default only where much time
-        passes.
+        Whether the trajectory is interrupted before each position; by default only at long pauses.
     errors : array of float64, (n,), optional
-        Distance of each position to the ground truth in `unit`, nan where it is not known: the
-        path gets its colours.
+        Distance of each position to the ground truth in `unit`, nan if unknown; it determines the
+        colours.
     timeline : Timeline, optional
-        Of the whole recording; by default that of the positions.
+        Length of the whole recording; by default that of the positions.
     unit : str
         Unit of length of all positions, for the axes.
     height : Height, optional
-        Which way is up; by default as the first camera was held.
+        The up direction; by default that of the first camera.
     """
     # The object interface keeps the process-wide state of pyplot untouched.
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
@@ -143,7 +142,7 @@ def draw_map_from_above(
     colour: palette.Colour,
     unit: str,
 ) -> None:
-    """Draw one of several maps into a part of a picture; arrays as for `draw_trajectory`."""
+    """Draw one of several maps into its panel; arrays as for `draw_trajectory`."""
     view = choose_view(positions)
     path = _Path(np.arange(float(len(positions))), positions, gaps)
     _draw_flat(axes, view, path, keyframes, points, None, "path", hexadecimal(colour))
@@ -164,7 +163,7 @@ class _Path:
     gaps: npt.NDArray[np.bool_]
 
     def draw(self, axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
-        """Draw a line that ends at gaps; a position between two gaps becomes a dot."""
+        """Draw a line with gaps; a position between two gaps becomes a dot."""
         where = np.flatnonzero(self.gaps)
         axes.plot(np.insert(x, where, np.nan), np.insert(y, where, np.nan), **style)
         alone = self.gaps | (np.arange(len(x)) == 0)
@@ -238,7 +237,7 @@ def _draw_flat(
 
 
 def _window(path: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper corner of what is shown."""
+    """Lower and upper corner of the visible part."""
     low, high = path.min(axis=0), path.max(axis=0)
     # The window follows the path and shows the points around it, but not those so far away that
     # they would shrink the path to a dot. It has the shape of the axes: lengths are equal on both.
@@ -253,7 +252,7 @@ def _window(path: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, unit: str) -> None:
-    """Colour the path by its distance to the truth; the bar beside it tells the lengths."""
+    """Colour the trajectory by its distance to the ground truth, with a colour bar."""
     from matplotlib.collections import LineCollection  # noqa: PLC0415
     from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415
     from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
@@ -277,7 +276,7 @@ def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, un
 
 
 def _say_where_up_is(axes: Axes, view: View, unit: str) -> None:
-    """Name the axes, say what is up in the picture, and draw a bar that tells a length."""
+    """Label the axes, name the up direction, and draw a scale bar."""
     axes.set_xlabel(f"{view.right_name} [{unit}]")
     axes.set_ylabel(f"{view.up_name} [{unit}]")
     whence = "From above" if view is FROM_ABOVE else "From behind"

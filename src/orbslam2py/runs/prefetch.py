@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images decoded ahead in a thread of their own."""
+"""Images decoded ahead in a separate thread."""
 
 from __future__ import annotations
 
@@ -25,22 +25,21 @@ def prefetch(
 ) -> Generator[tuple[int, Item | Exception], None, None]:
     """Yield ``load(i)`` for the given indices, loaded a few steps ahead.
 
-    An `Exception` in ``load`` does not end the iteration: it is delivered in the place of its item,
-    so that a bad image can be skipped. Closing the generator ends the thread; an item that is being
-    loaded then is waited for at most a second, and hinders neither the caller nor the end of the
-    process (which is why this is no `concurrent.futures.ThreadPoolExecutor`: the interpreter waits
-    for the threads of those).
+    An `Exception` in ``load`` does not end the iteration: it is yielded in place of its item, so
+    that a bad image can be skipped. Closing the generator ends the thread. It waits at most a
+    second for an item that is being loaded. After that, neither the caller nor the end of the
+    process waits for it; with `concurrent.futures.ThreadPoolExecutor` the interpreter would wait.
 
     Parameters
     ----------
     load
-        Loads one item; called in the other thread only.
+        Loads one item; called only in the other thread.
     indices
-        What to load, in order.
+        Items to load, in order.
     stop
-        Ends the iteration when it is set, also while an item is being waited for.
+        Ends the iteration when set, also during a wait for an item.
     ahead
-        Items loaded, or being loaded, at most before they are asked for.
+        Largest number of items that are loaded ahead.
 
     Yields
     ------

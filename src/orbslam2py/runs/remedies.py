@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What helps when frames have no pose, reason by reason."""
+"""Remedies for frames without a pose, by reason."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _WHAT_HELPS = {
 
 
 def what_helps(reason: Reason | str) -> str:
-    """Say what to change so that frames with this reason get a pose; empty if nobody knows."""
+    """Return the remedy for frames with this reason; empty if there is none."""
     if reason == DROPPED:
         return "leave out --realtime; fewer features (ORBextractor.nFeatures), smaller images"
     return next((text for known, text in _WHAT_HELPS.items() if known.value == str(reason)), "")
@@ -55,11 +55,11 @@ def what_helps(reason: Reason | str) -> str:
 def why_nothing_was_tracked(
     rows: Sequence[FrameRow], *, calibration_is_doubted: bool = False
 ) -> str:
-    """Name the commonest reason of a run without a pose, how common it was, and what helps.
+    """Return the most frequent reason of a run without a pose, its share, and the remedy.
 
-    That only the first of two views was found is named only if there is no other reason. Frames
-    that could not be read count as one reason, the one of the first of them. If a warning doubted
-    the calibration, that comes first, and other remedies after it.
+    `FIRST_VIEW` is given only if there is no other reason. All unreadable frames count as one
+    reason, that of the first one. If there is a warning about the calibration, it comes before the
+    other remedies.
     """
     reasons = Counter(row.reason for row in rows if row.state != "SKIPPED" and row.reason)
     skipped = [row.reason for row in rows if row.state == "SKIPPED"]

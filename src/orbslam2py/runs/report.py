@@ -41,11 +41,11 @@ class RunEvaluation:
     figures: Evaluation
     """Of all tracked frames."""
     keyframes_ate_rmse: float | None
-    """Of the keyframes alone [m]; None if too few of them have a true pose."""
+    """ATE of the keyframes [m]; None if too few of them have a true pose."""
     truth: Trajectory
-    """Ground truth over the time of the whole run, in the estimate's frame and unit."""
+    """Ground truth during the whole run, in the estimate's frame and unit."""
     height: Height
-    """Which way is up in the estimate's frame."""
+    """The up direction in the estimate's frame."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
@@ -54,7 +54,7 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
     Returns
     -------
     RunEvaluation or None
-        None if there is no ground truth, or no pose has a partner in it.
+        None if there is no ground truth, or no pose has a true one.
     """
     estimate = result.tracked_trajectory()
     # The unit of length of a single camera is its own.
@@ -153,7 +153,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
 
 
 def error_entry(error: Exception | None) -> str | None:
-    """What report.json says about what ended the run; None if nothing did."""
+    """Entry of report.json about an early end of the run; None if there was none."""
     if error is None:
         return None
     if isinstance(error, OrbSlamError | OSError):
@@ -163,7 +163,7 @@ def error_entry(error: Exception | None) -> str | None:
 
 
 def loaded_map_entry(loaded: SavedMap | MapFile | None) -> dict[str, Any] | None:
-    """What report.json says about the map that the run began in."""
+    """Entry of report.json about the initial map of the run."""
     if loaded is None:
         return None
     return {
@@ -175,14 +175,14 @@ def loaded_map_entry(loaded: SavedMap | MapFile | None) -> dict[str, Any] | None
 
 
 def depth_entry(result: RunResult) -> dict[str, Any] | None:
-    """What report.json says about the depth images; None without any."""
+    """Entry of report.json about the depth images; None without any."""
     if result.median_depth is None:
         return None
     return {"median_m": result.median_depth, "factor": result.settings.depth_factor}
 
 
 def weak_frames(result: RunResult) -> int:
-    """How many frames have a pose with weak evidence."""
+    """Return the number of frames with a pose of weak evidence."""
     records = [row.record for row in result.rows if row.record is not None]
     return sum(
         record.T_cw is not None
@@ -193,7 +193,7 @@ def weak_frames(result: RunResult) -> int:
 
 
 def options_entry(options: RunOptions) -> dict[str, Any]:
-    """What report.json says about which frames were taken, and what the system was to do."""
+    """Entry of report.json about the used frames and the options of the system."""
     return {
         "start": options.start,
         "stride": options.stride,
@@ -212,7 +212,7 @@ def options_entry(options: RunOptions) -> dict[str, Any]:
 
 
 def maps_entry(result: RunResult) -> list[dict[str, Any]]:
-    """What report.json says about the maps: all that began, those that are no more included."""
+    """Entry of report.json about all maps, also dropped and merged ones."""
     there = {summary.map_index: summary for summary in result.maps}
     merged_into = {merge.merged_map: merge.map_index for merge in result.merges}
     entries = []
@@ -240,7 +240,7 @@ def maps_entry(result: RunResult) -> list[dict[str, Any]]:
 
 
 def merge_entry(merge: MapsMerged) -> dict[str, Any]:
-    """What report.json says about two maps that became one."""
+    """Entry of report.json about the merge of two maps."""
     return {
         "map": merge.map_index,
         "merged": merge.merged_map,
@@ -257,7 +257,7 @@ def merge_entry(merge: MapsMerged) -> dict[str, Any]:
 
 
 def loop_entry(loop: LoopClosed) -> dict[str, Any]:
-    """What report.json says about a loop."""
+    """Entry of report.json about a loop."""
     return {
         "map": loop.map_index,
         "keyframes": [loop.matched_keyframe, loop.current_keyframe],
@@ -273,7 +273,7 @@ def loop_entry(loop: LoopClosed) -> dict[str, Any]:
 
 
 def adjustment_entry(record: FullAdjustmentRecord) -> dict[str, Any]:
-    """What report.json says about a full bundle adjustment."""
+    """Entry of report.json about a full bundle adjustment."""
     return {
         "map": record.map_index,
         "keyframes": record.n_keyframes,
@@ -292,7 +292,7 @@ def _rounded(milliseconds: dict[str, float]) -> dict[str, float]:
 
 
 def initialization_reasons(result: RunResult) -> dict[str, int]:
-    """Why there was no map yet: how many frames had each reason, the most frequent first."""
+    """Return the reasons before the first map with their frames, the most frequent first."""
     return dict(
         Counter(
             row.reason
@@ -303,7 +303,7 @@ def initialization_reasons(result: RunResult) -> dict[str, int]:
 
 
 def peak_memory_mb() -> float:
-    """Largest resident memory of this process so far, in megabytes."""
+    """Return the largest resident memory of this process so far, in megabytes."""
     # A child inherits ru_maxrss of the program that started it; Linux' own figure is the process's.
     with contextlib.suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():

@@ -24,7 +24,7 @@ from orbslam2py.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class FrameRow:
-    """One input frame and what became of it."""
+    """One input frame and its result."""
 
     index: int
     """Index in the sequence."""
@@ -63,35 +63,35 @@ def empty_snapshot() -> MapSnapshot:
 
 @dataclass
 class RunResult:
-    """Everything a run gives, whether it ended or was interrupted."""
+    """All results of a run, complete or interrupted."""
 
     sequence: Source
     settings: Settings
     options: RunOptions
     n_frames: int | None
-    """Frames that were to be processed; None for a camera as long as it runs, then those that
-    were."""
+    """Number of frames to process; None for a camera during the run, then the number that was
+    processed."""
     rows: list[FrameRow] = field(default_factory=list)
     trajectories: list[Trajectory] = field(default_factory=list)
-    """One per map, by its number, lost frames included; `Trajectory.indices` are positions in
-    `rows`. Empty for a map that has become part of another one."""
+    """One trajectory for each map, by its number, with lost frames; `Trajectory.indices` are
+    positions in `rows`. Empty for a merged map."""
     main_map: int = 0
-    """The map that the figures are of: the one with most tracked frames of those that were there at
-    the end; the last one if the system keeps only one."""
+    """The map of the figures: of the maps at the end, the one with most tracked frames; if the
+    system keeps only one, the last one."""
     maps: list[MapSummary] = field(default_factory=list)
-    """Those that were there at the end, the oldest first."""
+    """The maps at the end, the oldest first."""
     keyframes: Trajectory = field(default_factory=empty_trajectory)
     """Keyframes of the main map."""
     snapshot: MapSnapshot = field(default_factory=empty_snapshot)
     """The main map."""
     other_maps: list[MapSnapshot] = field(default_factory=list)
-    """The others that were there at the end, each in a world of its own."""
+    """Keyframes of the other maps at the end, each in its own world."""
     sightings: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     """(o, 2) ids of a point of the main map and of a keyframe that observes it."""
     drawing: MapArrays | None = None
-    """What is drawn of the main map."""
+    """The drawn parts of the main map."""
     kept_images: KeptImages | None = None
-    """Of some frames of a camera, which cannot be read again; None for a recording."""
+    """Images of some frames of a camera, which cannot be read again; None for a recording."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0
@@ -101,19 +101,19 @@ class RunResult:
     loops: list[LoopClosed] = field(default_factory=list)
     """Loops closed, over all maps."""
     merges: list[MapsMerged] = field(default_factory=list)
-    """Maps that have become part of older ones."""
+    """Merges of maps into older ones."""
     full_adjustments: list[FullAdjustmentRecord] = field(default_factory=list)
-    """Full bundle adjustments, also those that were given up."""
+    """Full bundle adjustments, also those that were stopped."""
     final_adjustment: FullAdjustmentRecord | None = None
-    """The one of the finished map, if it was asked for; the last of these."""
+    """The last full bundle adjustment of the finished map, if it was requested."""
     median_depth: float | None = None
     """Of the first depth images [m]; None without depth."""
     imu: dict[str, Any] | None = None
     """What is known of the IMU, as in ``report.json``; None without one."""
     warnings: list[str] = field(default_factory=list)
-    """What the result suffers from: a calibration that does not fit, a loss until the end."""
+    """Warnings about the result: a calibration that does not fit, a loss until the end."""
     calibration_warnings: list[str] = field(default_factory=list)
-    """Those of them that speak against the settings: of the lens, or of the depth images."""
+    """Warnings about the settings: of the lens, or of the depth images."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     input_counts: dict[str, float] | None = None
@@ -121,17 +121,17 @@ class RunResult:
     is_live: bool = False
     """The images came from a camera."""
     saved_map: Path | None = None
-    """The file that the maps were saved in; None if there is none, or only an older state in it."""
+    """The file of the saved maps; None if there is none, or if it has an older state."""
     last_save_failed: bool = False
-    """The maps were to be saved, and were not, or not in their last state."""
+    """Whether the maps were not saved as requested, or not in their last state."""
     interrupted: bool = False
-    """The run was stopped before its end; never for a camera, which has none."""
+    """Whether the run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None
     """What ended it."""
     started: str = ""
     """Date and time of its beginning, ISO 8601 with the time zone."""
     command: str | None = None
-    """The line that repeats it, if it was started by one."""
+    """The command line that repeats it, if there is one."""
 
     @property
     def n_tracked(self) -> int:
@@ -140,26 +140,26 @@ class RunResult:
 
     @property
     def n_skipped(self) -> int:
-        """Frames that could not be read or were refused."""
+        """Number of frames that were unreadable or refused."""
         return sum(row.state == "SKIPPED" for row in self.rows)
 
     @property
     def n_dropped(self) -> int:
-        """Frames that real time left no room for."""
+        """Number of frames that were dropped in real time."""
         return self.n_lost_by_camera + sum(row.state == "DROPPED" for row in self.rows)
 
     def tracked_trajectory(self) -> Trajectory:
-        """Frames of the main map that have a pose, after the last optimisation."""
+        """Number of frames of the main map with a pose, after the last optimisation."""
         if not self.trajectories:
             return empty_trajectory()
         main = self.trajectories[self.main_map]
         return main.select(~main.lost)
 
     def online_trajectory(self) -> Trajectory:
-        """Poses as they were when each frame was tracked.
+        """Poses from the time of tracking.
 
-        Those of frames that were tracked in the main map; if the system keeps only one, of all
-        maps that came after each other, every map in its own world frame.
+        Poses of frames that were tracked in the main map; if the system keeps only one map, of all
+        consecutive maps, each in its own world frame.
         """
         several = self.options.system.several_maps
         tracked = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A sequence in, a folder of results out: what the command does, for Python."""
+"""Run the system over a sequence and write its results: the command ``run`` for Python."""
 
 from __future__ import annotations
 
@@ -44,22 +44,22 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """A run that has ended, for whatever reason, and what is to be said about it."""
+    """The result of a run, also of an interrupted one."""
 
     result: RunResult
-    """Rows, trajectories and map; why it ended."""
+    """Rows, trajectories and map; why it ended early."""
     evaluation: RunEvaluation | None
-    """Against ground truth, where there is one."""
+    """Comparison with ground truth, if there is one."""
     report: dict[str, Any]
     """All figures, as in ``report.json``."""
     folder: Path | None
-    """Where the files are; None if none were asked for."""
+    """The folder of the files; None if none was given."""
     problems: tuple[str, ...]
-    """Files that could not be written, and where their copies are."""
+    """Files that could not be written, and the locations of their copies."""
 
     @property
     def trajectory(self) -> Trajectory:
-        """Frames of the main map that have a pose, after the last optimisation."""
+        """Number of frames of the main map with a pose, after the last optimisation."""
         return self.result.tracked_trajectory()
 
 
@@ -77,47 +77,46 @@ def run_sequence(
     control: RunControl | None = None,
     watch: Watch | None = None,
 ) -> FinishedRun:
-    """Run the system over a sequence, judge the result and write its files.
+    """Run the system over a sequence, evaluate the result and write its files.
 
     Parameters
     ----------
     sequence : Sequence or LiveSource
         Images, time stamps and settings, as from `orbslam2py.open_sequence`.
     options : RunOptions, optional
-        Which frames, and how; all of them with the sequence's sensor if None.
+        Which frames, and how; None: all, with the sequence's sensor.
     vocabulary : Vocabulary or path, optional
-        Visual words; the one shipped with the package if None.
+        Visual words; None: the vocabulary of the package.
     output : str or Path, optional
-        Folder for the results; nothing is written if None.
+        Folder for the results; None: no files.
     force : bool
-        Accept an output folder that holds files; the results of an earlier run are removed when
-        this one begins. Files called as results are that no run has written are not replaced, and
+        Accept an output folder that contains files; results of an earlier run in it are removed at
+        the beginning. Files with the names of results that are from no run are never replaced, and
         nothing is written among the sequence's own images.
     progress : callable, optional
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
-        Ends the run after the present frame when it is set; what was done is written.
+        An event that ends the run after the present frame when set; the results so far are written.
     report_page : bool
-        Write ``report.html`` and the images for it as well.
+        Also write ``report.html`` and its images.
     command : str, optional
-        The line that started the run, for its report.
+        The command line of the run, for its report.
     control : RunControl, optional
-        In place of `stop`: also holds the run and lets single frames through.
+        Instead of `stop`: can also pause the run and process single frames.
     watch : callable, optional
-        Called with the system; what it returns is entered before the first frame, and left when the
-        system has been shut down. For viewers, recordings, videos.
+        Called with the system; the context manager that it returns is entered before the first
+        frame, and left after the shutdown of the system. For viewers, recordings, videos.
 
     Returns
     -------
     FinishedRun
-        Also when the run was stopped or failed on the way: see `RunResult.interrupted` and
-        `RunResult.error`.
+        Also if the run was stopped or failed: see `RunResult.interrupted` and `RunResult.error`.
 
     Raises
     ------
     DatasetError
-        If the options make no sense for the sequence, none of its first images is there, its time
-        stamps are no text, or the folder cannot take results.
+        If the options do not fit the sequence, its first images are missing, its time stamps are no
+        text, or the folder cannot be used.
     SettingsError, VocabularyError, MapFileError
         If these cannot be used, or the map could not be saved at the end.
 
@@ -181,7 +180,7 @@ def run_sequence(
 def _prepared(
     folder: Path | None, saved_map: str | Path | None, settings: str, *, force: bool
 ) -> Iterator[None]:
-    """Make the folder of the results, and see that these and the map can be written."""
+    """Create the folder of the results, and check that results and map can be written."""
     target = None if saved_map is None else path_of(saved_map, "save_map")
     is_among_results = (
         target is not None and folder is not None and target.resolve().parent == folder.resolve()

@@ -35,7 +35,7 @@ def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
 
 
 def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
-    """Both ends of every loop of the main map, (l, 2, 3), in the frame of keyframe 0."""
+    """Both keyframes of every loop of the main map, (l, 2, 3), in the frame of keyframe 0."""
     snapshot = result.snapshot
     rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
     return np.asarray(result.keyframes.positions[rows])
@@ -93,7 +93,7 @@ def draw_run(
 
 
 def draw_maps_of_run(path: Path, result: RunResult, report: dict[str, Any]) -> None:
-    """Draw maps.png: all maps of the run, each in its colour.
+    """Draw maps.png: all maps of the run, each in one colour.
 
     Raises
     ------
@@ -111,9 +111,9 @@ def draw_maps_of_run(path: Path, result: RunResult, report: dict[str, Any]) -> N
 
 
 def metres_per_unit(result: RunResult, evaluation: RunEvaluation | None) -> float | None:
-    """Tell what lengths of the map are multiplied by for metres; None where nobody knows.
+    """Return metres per unit of the map; None if unknown.
 
-    A single camera's unit of length is its own: only ground truth tells how long it is.
+    A single camera's map has its own unit of length: only ground truth gives its size.
     """
     if result.options.sensor is not Sensor.MONOCULAR:
         return 1.0

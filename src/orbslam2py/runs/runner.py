@@ -53,9 +53,9 @@ Watch = Callable[[System], AbstractContextManager[object]]
 
 
 class SequenceRunner:
-    """Feeds a sequence or a camera's images to a `System` and collects the results.
+    """Feeds the images of a sequence or a camera to a `System` and collects the results.
 
-    A Ctrl-C, or a failure, ends the run early; what was computed is in the result.
+    Ctrl-C, or a failure, ends the run early; the result contains what was computed.
 
     Parameters
     ----------
@@ -118,19 +118,19 @@ class SequenceRunner:
         progress : callable, optional
             Called after every frame.
         stop : threading.Event, optional
-            Ends the run after the present frame when it is set: the only end of a camera's run
-            unless `RunOptions.max_frames` tells one.
+            An event that ends the run after the present frame when set; a camera's run ends only by
+            it, or by `RunOptions.max_frames`.
         control : RunControl, optional
-            In place of `stop`: also holds the run and lets single frames through.
+            Instead of `stop`: can also pause the run and process single frames.
         watch : callable, optional
-            Called with the system; what it returns is entered before the first frame, and left when
-            the system has been shut down. For viewers, recordings, videos.
+            Called with the system; the context manager that it returns is entered before the first
+            frame, and left after the shutdown of the system. For viewers, recordings, videos.
 
         Returns
         -------
         RunResult
-            Also when the run was stopped, by Ctrl-C as well, or something failed: see
-            `RunResult.interrupted` and `RunResult.error`.
+            Also if the run was stopped, also by Ctrl-C, or failed: see `RunResult.interrupted` and
+            `RunResult.error`.
         """
         result, options = self.result, self._options
         begin = time.perf_counter()
@@ -185,7 +185,7 @@ class SequenceRunner:
         return result
 
     def _judge_depth(self, system: System) -> None:
-        """Keep how far the depth is, and doubt a factor that is only that of another data set."""
+        """Store the depth, and warn of a factor that is only the default of another data set."""
         result = self.result
         result.median_depth = system.pipeline.front_end.depth_check.median
         if result.sequence.layout == Layout.TUM:
@@ -277,7 +277,7 @@ class SequenceRunner:
         return _row(frame, None, reason)
 
     def _file_of(self, frame: FedFrame) -> str:
-        """Name the file of a frame's image; empty if the source does not tell it."""
+        """Return the file of a frame's image; empty if unknown."""
         path_of = getattr(self.result.sequence, "image_path", None)
         # A sequence of the user's own may have something else of that name.
         place = path_of(frame.index) if callable(path_of) else None
@@ -373,7 +373,7 @@ class SequenceRunner:
 
 
 def main_map(system: System, trajectories: list[Trajectory]) -> int:
-    """Choose the map that the figures of a run are of: see `RunResult.main_map`."""
+    """Choose the map of the figures of a run: see `RunResult.main_map`."""
     last = len(trajectories) - 1
     if not system.options.several_maps:
         return last
@@ -385,7 +385,7 @@ def main_map(system: System, trajectories: list[Trajectory]) -> int:
 
 
 def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:
-    """Give every pose the position of its row; an interrupt may have left a pose without one."""
+    """Give every pose the position of its row; after an interrupt a pose may have none."""
     indices = np.array(positions, np.int64)
     return replace(trajectory, indices=indices).select(indices >= 0)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a run's path has gaps, and what was tracked when."""
+"""Gaps of a run's trajectory, and its periods of tracking."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Span = tuple[float, float]
 
 
 def gaps_in_time(seconds: FloatArray) -> npt.NDArray[np.bool_]:
-    """Find the places where too much time passes for a line to be drawn.
+    """Find long pauses, at which a line is interrupted.
 
     Parameters
     ----------
@@ -41,22 +41,22 @@ def gaps_in_time(seconds: FloatArray) -> npt.NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class Timeline:
-    """What became of the frames of a run, in seconds since the first of them."""
+    """The results of the frames of a run, in seconds since the first of them."""
 
     seconds: FloatArray
     """(n,) of every frame."""
     n_failed: IntArray
-    """(n,) how many frames up to each, itself included, should have a pose and have none."""
+    """(n,) number of frames up to each one that should have a pose but have none."""
     untracked: list[Span]
-    """When there was no pose."""
+    """Periods without a pose."""
     in_others: dict[int, list[Span]]
-    """When there were poses in another map than the main one, by its number."""
+    """Periods with poses in another map than the main one, by its number."""
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last; 0 without any.
+        """Return seconds from the first frame to the last; 0 without any.
 
-        Frames that were skipped may go backwards.
+        Times of skipped frames may decrease.
         """
         return float(max(self.seconds, default=0.0))
 
@@ -67,7 +67,7 @@ class Timeline:
         main_map: int,
         merged_into: Mapping[int, int] | None = None,
     ) -> Timeline:
-        """Take it from the rows of a run.
+        """Make it from the rows of a run.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class Timeline:
         main_map
             Number of its main map.
         merged_into
-            Maps that have become part of others, by their numbers: poses in them are poses there.
+            Merged maps and the maps that contain them, by their numbers.
         """
         seconds = np.array([float(row.timestamp) for row in rows])
         seconds = seconds - seconds[:1].sum()
@@ -98,12 +98,12 @@ class Timeline:
         Parameters
         ----------
         positions
-            Of the frames with a pose among those of the run, ascending, (k,).
+            Positions of the frames with a pose among those of the run, ascending, (k,).
 
         Returns
         -------
         array of bool, (k,)
-            Whether tracking failed, or nothing was seen for long, between each and the one before.
+            Return whether there is a loss or a long pause between each frame and the one before.
         """
         gaps = gaps_in_time(self.seconds[positions])
         gaps[1:] |= np.diff(self.n_failed[positions]) > 0
@@ -111,7 +111,7 @@ class Timeline:
 
 
 def _map_of(row: FrameRow, merged_into: Mapping[int, int]) -> int:
-    """The map that a frame has a pose in at the end; -1 without one."""
+    """Return the final map of a frame's pose; -1 without a pose."""
     number = row.record.map_index if row.record is not None and row.state == "OK" else -1
     while number in merged_into:
         number = merged_into[number]
@@ -119,7 +119,7 @@ def _map_of(row: FrameRow, merged_into: Mapping[int, int]) -> int:
 
 
 def _spans(seconds: FloatArray, chosen: npt.NDArray[np.bool_]) -> list[Span]:
-    """Stretches of chosen frames, each up to the next frame that is not."""
+    """Return the periods of selected frames, each up to the next frame that is not selected."""
     if not chosen.any():
         return []
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What must be known before the first image: sensor, camera, features, depth."""
+"""Settings that are needed before the first image: sensor, camera, features, depth."""
 
 from orbslam2py.settings.builtin import BUILTIN_NAMES
 from orbslam2py.settings.camera_model import AngleOfView, CameraModel

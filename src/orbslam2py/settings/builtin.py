@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of well-known data sets whose settings come with the package, and the files they stand in.
+"""Names of well-known data sets with built-in settings, and their files.
 
-The files lie in ``data/settings``, in the form in which users write their own.
+The files are in ``data/settings``, in the format of users' files.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _FOLDER = Path(__file__).parent.parent / "data" / "settings"
 
 
 def _one_file_for_rgbd_and_mono(name: str) -> dict[Sensor, str]:
-    """Say that one file serves both: keys that only RGB-D needs are not looked at for mono."""
+    """Say that one file serves both: mono ignores keys that only RGB-D needs."""
     return {Sensor.RGBD: f"{name}.yaml", Sensor.MONOCULAR: f"{name}.yaml"}
 
 
@@ -54,17 +54,17 @@ _KITTI_SEQUENCES = {
 
 
 def is_builtin_name(name: str) -> bool:
-    """Whether a name, in any case, is one of `BUILTIN_NAMES` or of a single KITTI sequence."""
+    """Return whether a name is one of `BUILTIN_NAMES` or of a KITTI sequence, in any case."""
     return name.lower() in _FILES or name.lower() in _KITTI_SEQUENCES
 
 
 def builtin_sensors(name: str) -> tuple[Sensor, ...]:
-    """Sensors for which there are settings of a name, the one it is made for first."""
+    """Return the sensors with settings of a name, its own one first."""
     return tuple(_FILES[_KITTI_SEQUENCES.get(name.lower(), name.lower())])
 
 
 def builtin_file(name: str, sensor: Sensor) -> Path:
-    """Find the settings file of a name.
+    """Return the settings file of a name.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def builtin_file(name: str, sensor: Sensor) -> Path:
     Raises
     ------
     SettingsError
-        If there is no such name, or none for that sensor.
+        If there is no such name, or none for this sensor.
     """
     key = _KITTI_SEQUENCES.get(name.lower(), name.lower())
     if key not in _FILES:

@@ -17,7 +17,7 @@ _LARGEST_SIZE = 2**31 - 1
 
 
 class AngleOfView(NamedTuple):
-    """Angles that an image shows, in radians; they may exceed pi.
+    """Angles of view of an image, in radians; they may exceed pi.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class AngleOfView(NamedTuple):
 class CameraModel:
     """A calibrated camera of any model: pixels of points, and rays of pixels.
 
-    The pixels are those of the image as it is, with distortion; the centre of the top-left pixel is
-    (0, 0). Points and rays are in the camera frame: z along the optical axis, x right, y down.
-    Objects are immutable and equal if model, parameters and image size are equal.
+    Pixels belong to the unchanged image, with distortion; the centre of the top-left pixel is (0,
+    0). Points and rays are in the camera frame: z along the optical axis, x right, y down. Objects
+    are immutable and equal if model, parameters and image size are equal.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class CameraModel:
         return self._image_size
 
     def project(self, points: FloatArray | Sequence[Sequence[float]]) -> FloatArray:
-        """Give the pixels at which the camera shows points.
+        """Project points to pixels.
 
         Parameters
         ----------
@@ -154,8 +154,8 @@ class CameraModel:
         Returns
         -------
         array of float64 (n, 2)
-            Pixels (u, v). NaN for points outside of the domain of the model. Pixels outside of the
-            image are given as well.
+            Pixels (u, v). NaN for points outside of the domain of the model. Pixels outside the
+            image are returned too.
 
         Raises
         ------
@@ -167,7 +167,7 @@ class CameraModel:
     def project_with_jacobian(
         self, points: FloatArray | Sequence[Sequence[float]]
     ) -> tuple[FloatArray, FloatArray]:
-        """Give the pixels at which the camera shows points, and their derivatives.
+        """Project points to pixels, with derivatives.
 
         Parameters
         ----------
@@ -185,18 +185,18 @@ class CameraModel:
         return self._core.project_with_jacobian(_rows_of(points, "points", 3))
 
     def unproject(self, pixels: FloatArray | Sequence[Sequence[float]]) -> FloatArray:
-        """Give the directions in which pixels look.
+        """Return the directions of pixels.
 
         Parameters
         ----------
         pixels
-            (n, 2), with distortion, also outside of the image.
+            (n, 2), with distortion; pixels outside the image are allowed.
 
         Returns
         -------
         array of float64 (n, 3)
             Rays of length 1 in the camera frame; z is negative beyond 90 degrees from the axis. NaN
-            for pixels at which the model shows nothing.
+            for pixels outside the domain of the model.
 
         Raises
         ------
@@ -208,7 +208,7 @@ class CameraModel:
     def pixels_per_radian(
         self, pixels: FloatArray | Sequence[Sequence[float]] | None = None
     ) -> FloatArray:
-        """Give the resolution of the image at pixels.
+        """Return the resolution of the image at pixels.
 
         Parameters
         ----------
@@ -219,19 +219,19 @@ class CameraModel:
         -------
         array of float64 (n,)
             Pixels per radian, as the geometric mean over all directions: the square root of the
-            area in the image per solid angle. NaN where the model shows nothing.
+            area in the image per solid angle. NaN outside the domain of the model.
         """
         if pixels is None:
             pixels = [self.parameters[2:4]]
         return self._core.pixels_per_radian(_rows_of(pixels, "pixels", 2))
 
     def angle_of_view(self) -> AngleOfView:
-        """Give the angles that the image shows, between its borders and between its corners.
+        """Return the angles of view of the image, between its borders and between its corners.
 
         Returns
         -------
         AngleOfView
-            In radians. Where the model shows nothing at a border, the last pixel before the border
+            In radians. If a border is outside the domain of the model, the last pixel inside
             counts.
         """
         return AngleOfView(*self._core.angle_of_view())
@@ -260,7 +260,7 @@ class CameraModel:
 
 
 def _in_order(model: str, parameters: Mapping[str, float]) -> list[float]:
-    """Numbers of a mapping in the order of the model; an unknown model is left to the core."""
+    """Return the numbers of a mapping in the order of the model; the core checks the model."""
     names: Sequence[str] = ()
     for name, aliases, own in _core.camera_models():
         if model.lower() in (name, *(alias.lower() for alias in aliases)):
@@ -275,7 +275,7 @@ def _in_order(model: str, parameters: Mapping[str, float]) -> list[float]:
 
 
 def _floats(model: str, parameters: Any) -> list[float]:
-    """The parameters as numbers; their count and ranges are checked by the core."""
+    """Return the parameters as numbers; the core checks their count and ranges."""
     try:
         if isinstance(parameters, str | bytes):
             raise TypeError

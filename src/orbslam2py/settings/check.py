@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a settings file can be used for."""
+"""The sensors that a settings file can be used for."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class ChosenSettings:
-    """Built-in settings, or a file whose text was read once: it may be a pipe.
+    """Built-in settings, or a file whose text is read only once, because it may be a pipe.
 
     Attributes
     ----------
     choice
         The built-in name, or the path of the file.
     text
-        What the file holds; None for built-in settings.
+        The text of the file; None for built-in settings.
     """
 
     choice: str
@@ -51,7 +51,7 @@ class ChosenSettings:
 
     @property
     def likely_sensor(self) -> Sensor:
-        """What they were made for, as the keys of a file tell."""
+        """Return the sensor that the keys of the file suggest."""
         if self.text is None:
             return builtin_sensors(self.choice)[0]
         keys = translate(scan(self.text), Sensor.MONOCULAR).entries
@@ -60,10 +60,10 @@ class ChosenSettings:
         return Sensor.STEREO if {"Camera.bf", "ThDepth"} & set(keys) else Sensor.MONOCULAR
 
     def usable_sensors(self) -> tuple[Sensor, ...]:
-        """Sensors for which they are complete, the likely one first.
+        """Return the sensors for which they are complete, the most likely one first.
 
-        A file with distortion, or for depth images, is not taken to be for a pair of rectified
-        cameras, though it may be complete for it.
+        A file with distortion, or for depth images, does not count as one for a rectified pair,
+        although it may be complete for it.
         """
         if self.text is None:
             return builtin_sensors(self.choice)
@@ -79,7 +79,7 @@ def read_choice(choice: str | PathLike[str]) -> ChosenSettings:
     Raises
     ------
     SettingsError
-        If it is neither a name nor a file that can be read.
+        If it is neither a name nor a readable file.
     """
     if is_builtin_name(str(choice)):
         return ChosenSettings(str(choice), None)
@@ -90,7 +90,7 @@ def read_choice(choice: str | PathLike[str]) -> ChosenSettings:
 
 
 def doubts_of_size(settings: Settings) -> list[str]:
-    """Say which of their cameras cannot belong to images of the size that the settings name."""
+    """Return problems of cameras that do not fit the image size in the settings."""
     found = []
     if settings.rectification is not None:
         for side in ("left", "right"):
@@ -101,21 +101,21 @@ def doubts_of_size(settings: Settings) -> list[str]:
 
 
 def warn_of_doubts(settings: Settings, source: str | PathLike[str]) -> None:
-    """Log what is allowed, but probably a mistake.
+    """Log values that are allowed, but probably wrong.
 
     Parameters
     ----------
     settings
         The settings.
     source
-        Where they are from, or where they were written, for the messages.
+        The source or the file of the settings, for the messages.
     """
     for doubt in (*settings.doubts(), *doubts_of_size(settings)):
         _log.warning("%s: %s", source, doubt)
 
 
 def _doubts_of_views(settings: Settings) -> list[str]:
-    """Say that a pair hardly looks the same way, of which its rectified camera is odd, too."""
+    """Return a warning about a pair with very different viewing directions."""
     if settings.rectification is None:
         return []
     views = views_of_pair(settings.rectification)
@@ -140,7 +140,7 @@ def _misfits(name: str, settings: Settings) -> list[str]:
 
 
 def _is_published(settings: Settings) -> bool:
-    """Whether numbers and size are those of a data set: KITTI's name one size for three."""
+    """Return whether numbers and size are those of a data set; KITTI's size serves three."""
     name = known_camera(settings.camera)
     if name is None:
         return False

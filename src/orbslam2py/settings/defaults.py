@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings for one's own camera: what is usual for all that is not the camera itself."""
+"""Usual values for all settings that are not the camera itself."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ def settings_for_camera(
     depth_factor: float | None = None,
     orb: OrbSettings | None = None,
 ) -> Settings:
-    """Make complete settings of a camera: all that is not known of it is what is usual.
+    """Make complete settings of a camera, with usual values for all unknown ones.
 
     Parameters
     ----------
     camera
-        The camera; its ``bf`` counts if there is no `baseline`.
+        The camera; its ``bf`` is used if there is no `baseline`.
     sensor
         What delivers the images.
     baseline
-        Distance of the two cameras of a pair [m]. For RGB-D that of the pair it counts as: points
-        nearer than 40 baselines are close; by default 0.075 m, which makes 3 m.
+        Distance of the two cameras of a pair [m]. For RGB-D the equivalent baseline: points nearer
+        than 40 baselines are close; by default 0.075 m, which gives 3 m.
     depth_factor
         RGB-D: units of the depth images per metre; by default 1000 (millimetres).
     orb
@@ -59,8 +59,8 @@ def settings_for_camera(
     Raises
     ------
     SettingsError
-        If a number is out of range or does not go with the sensor, the baseline of a pair is
-        missing, or a pair is not rectified.
+        If a number is out of range or does not fit the sensor, the baseline of a pair is missing,
+        or a pair is not rectified.
     """
     sensor = Sensor(sensor)
     if not isinstance(camera, CameraSettings):

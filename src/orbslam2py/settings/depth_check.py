@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether the first depth images fit the factor of the settings.
 
-A wrong factor is not seen in anything later: the map is consistent, only of another size.
+Later results do not show a wrong factor: the map is consistent, but of another size.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class DepthCheck:
     Parameters
     ----------
     factor
-        Raw units per metre as the settings have them.
+        Raw units per metre in the settings.
 
     Attributes
     ----------
@@ -59,16 +59,16 @@ class DepthCheck:
 
     @property
     def done(self) -> bool:
-        """Whether nothing further needs to be looked at."""
+        """Whether the check is finished."""
         return self._left == 0 or self._chances == 0
 
     @property
     def median(self) -> float | None:
-        """Median of those of the images looked at [m]; None if none had depth."""
+        """Median of the medians of the examined images [m]; None if none had depth."""
         return float(np.median(self._medians)) / self._factor if self._medians else None
 
     def look(self, depth: npt.NDArray[np.generic]) -> None:
-        """Judge a raw depth image (height, width); one without depth does not count."""
+        """Check a raw depth image (height, width); one without depth does not count."""
         if self.done:
             return
         self._chances -= 1
@@ -87,19 +87,19 @@ class DepthCheck:
 
 
 def doubt_of_tum_factor(factor: float, median: float | None) -> str | None:
-    """Say that the factor of TUM RGB-D is likely wrong for data that is not in its layout.
+    """Return a warning that the factor of TUM RGB-D is probably wrong for data of another layout.
 
     Parameters
     ----------
     factor
-        Raw units per metre as the settings have them.
+        Raw units per metre in the settings.
     median
-        What it makes of the median of the depth [m]; None if there was no depth.
+        Median of the depth by this factor [m]; None if there was no depth.
 
     Returns
     -------
     str or None
-        None if there is nothing to say.
+        None if there is no doubt.
     """
     if factor != _TUM_FACTOR or median is None or median >= _NEAR:
         return None
@@ -111,7 +111,7 @@ def doubt_of_tum_factor(factor: float, median: float | None) -> str | None:
 
 
 def is_known(depth: npt.NDArray[np.generic]) -> npt.NDArray[np.bool_]:
-    """Whether raw depths are above 0 and finite; the largest integer stands for unknown, too."""
+    """Return whether raw depths are positive and finite; the largest integer means unknown, too."""
     known: npt.NDArray[np.bool_] = np.isfinite(depth) & (depth > 0)  # type: ignore[operator]
     if depth.dtype.kind in "ui":
         known &= depth != np.iinfo(depth.dtype).max  # type: ignore[type-var]
@@ -119,14 +119,14 @@ def is_known(depth: npt.NDArray[np.generic]) -> npt.NDArray[np.bool_]:
 
 
 def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:
-    """Median of what is known [raw]."""
+    """Median of the known depths [raw]."""
     known = depth[is_known(depth)]
     # Halfway between the largest floats, and the power of ten below the smallest, are none.
     return float(np.median(np.clip(known, *_SENSIBLE, dtype=np.float64))) if len(known) else None
 
 
 def _fitting_factor(median: float) -> float:
-    """The commonest factor that makes a likely depth; else a power of ten that makes 1 to 10 m."""
+    """Return the most common factor with a likely depth; else a power of ten."""
     for factor in _USUAL:
         if _LIKELY[0] <= median / factor <= _LIKELY[1]:
             return factor

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What settings allow, but is probably a mistake, wherever their numbers are from."""
+"""Values that settings allow, but that are probably wrong."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _INTRINSICS = ((0, 0), (1, 1), (0, 2), (1, 2))
 
 
 def find_doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
-    """Say what is allowed but probably a mistake, one sentence each.
+    """Return values that are allowed but probably wrong, one sentence each.
 
     Parameters
     ----------
     sensor
-        What the settings are for.
+        The sensor of the settings.
     groups
         The settings.
     """
@@ -100,7 +100,7 @@ def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> lis
 def _doubts_of_lens(
     name: str, K: FloatArray, D: FloatArray, size: tuple[int | None, int | None]
 ) -> list[str]:
-    """Judge a distortion; an image of unknown size is taken to be twice the principal point."""
+    """Check a distortion; an unknown image size is assumed to be twice the principal point."""
     found = []
     p1, p2 = D[2:4]
     if max(abs(p1), abs(p2)) > _MOST_TANGENTIAL:
@@ -125,10 +125,10 @@ def _doubts_of_lens(
 
 
 def _doubts_of_fisheye(camera: CameraSettings, size: tuple[int | None, int | None]) -> list[str]:
-    """Judge a fisheye lens by the part of the image that its model reaches.
+    """Check a fisheye lens by the part of the image inside the domain of its model.
 
-    The corners of a fisheye image may be dark, and its left and right border as well: half of the
-    distance to the nearest border must show something.
+    The corners, and the left and right border, of a fisheye image may be dark: but the model must
+    be valid up to half of the distance to the nearest border.
     """
     width, height = (
         max(1, round(one or 2 * c)) for one, c in zip(size, (camera.cx, camera.cy), strict=True)
@@ -148,7 +148,7 @@ def _doubts_of_fisheye(camera: CameraSettings, size: tuple[int | None, int | Non
 
 
 def _fold_of(D: FloatArray) -> float:
-    """Largest distance from the centre to which a lens draws, on the plane at distance 1."""
+    """Return the largest radius of a lens, on the plane at distance 1."""
     radius = largest_radius(D)
     if not np.isfinite(radius):
         return float("inf")

@@ -64,22 +64,22 @@ def needs_right_camera() -> str:
 
 
 def plain_name(name: object) -> str:
-    """A name in lower case, without signs between words."""
+    """Return a name in lower case, without signs between words."""
     return re.sub(r"[^a-z0-9]", "", str(name).lower())
 
 
 def fisheye_model(name: object) -> str | None:
-    """Find the fisheye model that a program means: a key of `LENS_PARAMETERS`, or None."""
+    """Return our fisheye model for another program's name: a key of `LENS_PARAMETERS`, or None."""
     return _MODELS.get(plain_name(name))
 
 
 def checked_model(model: object) -> str:
-    """Take the name of a model: "pinhole", or a fisheye model by any of its names.
+    """Return the name of a model: "pinhole", or a fisheye model by any of its names.
 
     Raises
     ------
     SettingsError
-        If it is another one.
+        If the model is unknown.
     """
     if model == PINHOLE:
         return PINHOLE
@@ -93,12 +93,12 @@ def checked_model(model: object) -> str:
 
 
 def checked_lens(model: str, lens: object) -> tuple[float, ...]:
-    """Take the lens parameters of a model, whose ranges are checked elsewhere.
+    """Return the lens parameters of a model; their ranges are checked elsewhere.
 
     Raises
     ------
     SettingsError
-        If they are no numbers, or others than the model has.
+        If they are no numbers, or not those of the model.
     """
     names = LENS_PARAMETERS.get(model, ())
     wanted = f"give {', '.join(names)}" if names else "leave it out, or name a fisheye model"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a calibration can belong to images of a size, or to a calibration that comes with them.
+"""Whether a calibration fits images of a size, or the calibration beside them.
 
-A wrong calibration gives a map that is bent, and no error anywhere. What is judged here needs no
-more than the size of the images; what the images themselves tell is `orbslam2py.runs`' part.
+A wrong calibration gives a distorted map without any error message. This check needs only the size
+of the images; checks of the images are in `orbslam2py.runs`.
 """
 
 from __future__ import annotations

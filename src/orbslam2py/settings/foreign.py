@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calibration files of other programs: which there are, how they are recognised, what to do.
+"""Calibration files of other programs: their names, signs and commands.
 
-`FORMATS` is the one list of them. `orbslam2py.calibration.formats` adds how each is read, and the
-documentation is made of it.
+`FORMATS` is the only list of them. `orbslam2py.calibration.formats` adds their readers, and the
+documentation is generated from it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from orbslam2py.settings.sensor import Sensor
 
 
 class CalibrationText:
-    """The text of a file, and what it holds if it is JSON.
+    """The text of a file, and its contents if it is JSON.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class CalibrationText:
 
     @cached_property
     def json(self) -> Mapping[str, Any]:
-        """The named values of JSON; empty if it is none."""
+        """Return the named values of JSON; empty if the text is no JSON."""
         try:
             values = json.loads(self.text)
         except (ValueError, RecursionError):
@@ -42,7 +42,7 @@ class CalibrationText:
         return values if isinstance(values, dict) else {}
 
     def has(self, *keys: str) -> bool:
-        """Whether JSON has all these keys."""
+        """Return whether JSON has all these keys."""
         return all(key in self.json for key in keys)
 
 
@@ -55,20 +55,20 @@ class ForeignFormat:
     name
         As ``--format`` of ``import-camera`` takes it.
     noun
-        What such a file is called, with its article.
+        Name of the file, with its article.
     written_by
         The programs that write it.
     description
-        What is read of it, in one plain line.
+        What is read from it, in one line.
     sign
-        Whether a text is of this kind.
+        Return whether a text is of this kind.
     example
         A line or two of such a file, by which it is recognised.
     pair
-        What settings of a stereo pair need: "file" (it holds the pair), "right" (the file of the
-        right camera as well), or "baseline" (rectified images and their baseline).
+        What settings of a stereo pair need: "file" (it has the pair), "right" (also the file of the
+        right camera), or "baseline" (rectified images and their baseline).
     rate
-        Images per second that are usual.
+        Usual number of images per second.
     """
 
     name: str
@@ -82,13 +82,13 @@ class ForeignFormat:
 
 
 def _line(*patterns: str) -> Callable[[CalibrationText], bool]:
-    """A sign: lines that begin so."""
+    """A sign: lines with this beginning."""
     found = [re.compile(pattern, re.MULTILINE) for pattern in patterns]
     return lambda content: all(one.search(content.text) for one in found)
 
 
 def _is_opencv(content: CalibrationText) -> bool:
-    """Settings of ORB-SLAM hold matrices of OpenCV as well."""
+    """Settings of ORB-SLAM contain matrices of OpenCV too."""
     found = re.search(r"opencv-(?:nd-)?matrix|<opencv_storage>", content.text)
     return bool(found) and not _line(r"^Camera1?\.fx\s*:")(content)
 
@@ -343,13 +343,13 @@ FOREIGN_FORMATS = {one.name: one.noun for one in FORMATS}
 
 
 def recognise_camera_file(text: str) -> str | None:
-    """Tell by its text who wrote a calibration file: a key of `FOREIGN_FORMATS`, or None."""
+    """Return the program of a calibration file by its text: a key of `FOREIGN_FORMATS`, or None."""
     content = CalibrationText(text)
     return next((one.name for one in FORMATS if one.sign(content)), None)
 
 
 def import_line(path: Path, file_format: str, sensor: Sensor, text: str) -> str:
-    """Return the command that makes settings of such a file, of which `text` is the content."""
+    """Return the command that converts such a file to settings; `text` is its content."""
     kind = _BY_NAME[file_format]
     words = ["orbslam2py", "import-camera", str(path), "--sensor", str(sensor)]
     if sensor is Sensor.RGBD:
@@ -363,7 +363,7 @@ def import_line(path: Path, file_format: str, sensor: Sensor, text: str) -> str:
 
 
 def new_line(sensor: Sensor) -> str:
-    """Return the command that makes settings of a camera's numbers, which are to be filled in."""
+    """Return the command that makes settings, with places for a camera's parameters."""
     words = ["orbslam2py settings new --sensor", str(sensor), "--fx FX --fy FY --cx CX --cy CY"]
     if sensor is Sensor.RGBD:
         words.append("--depth-factor 1000")

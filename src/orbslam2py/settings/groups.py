@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The groups of which settings are made: camera, features, depth, rectification, map view.
+"""The groups of settings: camera, features, depth, rectification, map view.
 
-Every group checks its values when it is made and names all that are wrong by the keys of the
-settings file. The meaning of a key is described at the field it becomes.
+Every group checks its values when it is created, and names all invalid ones by the keys of the
+settings file. The meaning of a key is described at its field.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from orbslam2py.settings.projection import on_image_plane
 
 
 def raise_if_any(problems: list[str]) -> None:
-    """Raise `SettingsError` with all problems in one message, if there are some."""
+    """Raise `SettingsError` with all problems in one message, if there are any."""
     if problems:
         raise SettingsError("; ".join(problems))
 
@@ -66,7 +66,7 @@ class CameraSettings:
     Raises
     ------
     SettingsError
-        Naming all values that are wrong, by the keys of the settings file.
+        The message names all invalid values by the keys of the settings file.
     """
 
     fx: float
@@ -109,7 +109,7 @@ class CameraSettings:
 
     @property
     def is_fisheye(self) -> bool:
-        """Whether the camera has a fisheye model; its keypoints are raw pixels then."""
+        """Return whether the camera has a fisheye model; its keypoints are raw pixels then."""
         return self.model != PINHOLE
 
     def camera_model(self, width: int, height: int) -> CameraModel:
@@ -128,7 +128,7 @@ class CameraSettings:
         Raises
         ------
         SettingsError
-            If the size is none, or the focal lengths cannot belong to images of this size.
+            If the size is invalid, or the focal lengths do not fit images of this size.
         """
         intrinsics = (self.fx, self.fy, self.cx, self.cy)
         if self.is_fisheye:
@@ -138,7 +138,7 @@ class CameraSettings:
 
     @property
     def pixels_per_radian(self) -> float:
-        """Pixels that the image moves in its middle per radian that the camera turns."""
+        """Return pixels of motion in the middle of the image per radian of rotation."""
         if not self.is_fisheye:
             return self.fx
         model = self.camera_model(self.width or 1, self.height or 1)
@@ -153,8 +153,8 @@ class CameraSettings:
     def distortion(self) -> FloatArray:
         """Coefficients in OpenCV's order, float64 (4,), (5,) or (8,).
 
-        k1, k2, p1, p2; with k3 only if it is not 0; with k3, k4, k5, k6 if one of the last three
-        is not 0. All 0 for a fisheye lens, whose parameters are in `lens`.
+        k1, k2, p1, p2; also k3 if it is not 0; also k3, k4, k5, k6 if one of the last three is not
+        0. All 0 for a fisheye lens, whose parameters are in `lens`.
         """
         four = [self.k1, self.k2, self.p1, self.p2]
         if self.k4 or self.k5 or self.k6:
@@ -169,7 +169,7 @@ class CameraSettings:
     def project(
         self, points: FloatArray, T_cw: FloatArray | None = None, *, distort: bool = True
     ) -> FloatArray:
-        """Find where points are seen.
+        """Project points to pixels.
 
         Parameters
         ----------
@@ -177,18 +177,18 @@ class CameraSettings:
             Positions in the world (n, 3), as in `orbslam2py.MapSnapshot.point_positions`.
         T_cw
             World to camera (4, 4), as in `orbslam2py.TrackingRecord.T_cw`; None if the points are
-            in camera coordinates (x right, y down, z forward) already.
+            already in camera coordinates (x right, y down, z forward).
         distort
-            Give pixels of the images as they come. False: undistorted pixels, as the keypoints of
-            `orbslam2py.FrameFeatures` are; there is no difference for rectified images, nor for
-            fisheye lenses, whose keypoints are pixels of the images.
+            Return pixels of the unchanged images. False: undistorted pixels, as the keypoints of
+            `orbslam2py.FrameFeatures`; there is no difference for rectified images, nor for fisheye
+            lenses, whose keypoints are raw pixels.
 
         Returns
         -------
         FloatArray
-            Pixels u, v, float64 (n, 2), also beside the image. NaN for points that are not in front
-            of the camera, or so far aside that the distortion says nothing of them. A fisheye lens
-            shows points behind the camera as far as its model reaches.
+            Pixels u, v, float64 (n, 2), also outside the image. NaN for points that are not in
+            front of the camera, or outside the domain of the distortion. A fisheye lens shows
+            points behind the camera, in the domain of its model.
 
         Raises
         ------
@@ -308,7 +308,7 @@ class ViewerSettings:
 
 @dataclass(frozen=True, eq=False)
 class CameraRectification(MadeAgainByCopies):
-    """How one raw camera of a stereo pair becomes a rectified one (OpenCV's conventions).
+    """Rectification of one raw camera of a stereo pair (OpenCV's conventions).
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which keys a settings file may hold, what their values may be, and who needs them.
+"""The keys of a settings file, their allowed values, and the sensors that need them.
 
-One table serves the reader, the checks of the dataclasses and the writer.
+One table is used by the reader, the checks of the dataclasses and the writer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _RGBD = frozenset({Sensor.RGBD})
 
 @dataclass(frozen=True)
 class Rule:
-    """The values a key allows: the sentence for the user and the test."""
+    """The allowed values of a key: a sentence for the user, and a test."""
 
     text: str
     allows: Callable[[float], bool]
@@ -40,17 +40,17 @@ class Key:
     name
         As written in the file.
     group, field
-        Where the value lives in `orbslam2py.settings.Settings`.
+        Field of the value in `orbslam2py.settings.Settings`.
     kind
         ``float``, ``int`` or ``bool`` (written 0 or 1).
     rule
         Allowed values.
     sensors
-        Who uses the key; for other sensors it may stand in the file and is not looked at.
+        Sensors that use the key; others ignore it.
     required
-        Whether those sensors cannot do without it.
+        Whether these sensors need it.
     usual
-        Values that most have, for messages.
+        Usual values, for messages.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Key:
 
     @property
     def allowed(self) -> str:
-        """The values allowed, and those that are usual, for a message."""
+        """Return the allowed and the usual values, for a message."""
         return f"{self.rule.text} (usual: {self.usual})" if self.usual else self.rule.text
 
 
@@ -197,7 +197,7 @@ _NAMES = (
 
 
 def is_known(name: str) -> bool:
-    """Whether a key is one of ours."""
+    """Return whether a key is one of ours."""
     return name in _NAMES
 
 
@@ -215,33 +215,33 @@ _OTHER_NAMES = {
 
 
 def nearest_key(name: str, *, spelling: bool = True) -> str | None:
-    """Find the key that was meant: ``fx`` is ``Camera.fx``; None if nothing comes close.
+    """Find the intended key: ``fx`` is ``Camera.fx``; None if nothing is similar.
 
     Parameters
     ----------
     name
         As somebody wrote it.
     spelling
-        Also take what is only spelt alike.
+        Also accept keys with a similar spelling.
     """
     plain = name.rpartition(".")[2].replace("_", "").replace("-", "").lower()
     return _OTHER_NAMES.get(plain) or (nearest(name, _NAMES) if spelling else None)
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str | None:
-    """Find the candidate spelt most alike, whatever the case; None if nothing comes close."""
+    """Find the candidate with the most similar spelling; None if nothing is similar."""
     by_lower = {candidate.lower(): candidate for candidate in sorted(candidates)}
     matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
     return by_lower[matches[0]] if matches else None
 
 
 def convert(key: Key, value: float) -> float | int | bool:
-    """Check a finite number against the rule of its key and give it the key's type.
+    """Check a finite number by the rule of its key, and convert it to the key's type.
 
     Raises
     ------
     ValueError
-        With a sentence for the user.
+        The message is a sentence for the user.
     """
     if not math.isfinite(value):
         raise ValueError(f"{key.name} is not finite; allowed: {key.allowed}")
@@ -257,7 +257,7 @@ _MAY_BE_UNKNOWN = ("width", "height", "raw_per_metre")
 
 
 def focal_problems(what: str, K: FloatArray) -> list[str]:
-    """Say what is wrong with the focal lengths of a camera matrix."""
+    """Return what is wrong with the focal lengths of a camera matrix."""
     lengths = float(K[0, 0]), float(K[1, 1])
     if all(map(FOCAL.allows, lengths)):
         return []
@@ -268,9 +268,9 @@ def focal_problems(what: str, K: FloatArray) -> list[str]:
 
 
 def check_group(group: str, values: object) -> list[str]:
-    """Say what is wrong with the values of one settings dataclass.
+    """Return what is wrong with the values of one settings dataclass.
 
-    Good values get the type of their key, so that NumPy's numbers become Python's own.
+    Valid values are converted to the type of their key, so that NumPy's numbers become Python's.
     """
     problems = []
     for key in KEYS:

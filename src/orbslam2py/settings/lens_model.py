@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which lens a settings file is for, and the parameters of a fisheye lens."""
+"""The lens of a settings file, and the parameters of a fisheye lens."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class FileLens:
     model
         "pinhole", or a fisheye model of `orbslam2py.settings.fisheye.LENS_PARAMETERS`.
     entry
-        The entry that names it; None if none does.
+        The entry with its name; None if there is none.
     """
 
     model: str
@@ -53,7 +53,7 @@ class FileLens:
 
     @property
     def named(self) -> str:
-        """How the file names it."""
+        """Return the name in the file."""
         return "" if self.entry is None else f"{self.entry.key} {self.entry.value}"
 
 
@@ -70,8 +70,8 @@ def lens_of_file(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> Fi
     Raises
     ------
     SettingsError
-        If the model is unknown or not supported, the file contradicts itself, or its coefficients
-        are those of a fisheye lens and it names none; with what to do.
+        If the model is unknown or not supported, the file contradicts itself, or it has
+        coefficients of a fisheye lens without naming one; the message gives the remedy.
     """
     keys: tuple[str, ...] = _MODEL_KEYS
     if sensor is not Sensor.STEREO and RECTIFIER_MODEL in entries:  # the raw left camera is taken
@@ -158,7 +158,7 @@ def _refuse_unnamed_fisheye(entries: Mapping[str, Entry], lens: FileLens, path: 
 
 
 def _has_four_radial(entries: Mapping[str, Entry], camera: str) -> bool:
-    """Whether the fourth coefficient is not one of the rational model's six."""
+    """Return whether the fourth coefficient does not belong to the six of the rational model."""
     k4 = entries.get(f"{camera}.k4")
     if k4 is None or any(f"{camera}.{name}" in entries for name in ("k5", "k6")):
         return False
@@ -167,7 +167,7 @@ def _has_four_radial(entries: Mapping[str, Entry], camera: str) -> bool:
 
 
 def take_lens(document: Document, lens: FileLens) -> dict[str, Any]:
-    """Take the parameters of a fisheye lens out of the entries of a file.
+    """Read the parameters of a fisheye lens from the entries of a file.
 
     Parameters
     ----------
@@ -179,8 +179,8 @@ def take_lens(document: Document, lens: FileLens) -> dict[str, Any]:
     Returns
     -------
     dict
-        The fields ``model`` and ``lens`` of `CameraSettings`; empty for a pinhole, and if something
-        is wrong.
+        The fields ``model`` and ``lens`` of `CameraSettings`; empty for a pinhole, and if there is
+        an error.
     """
     if lens.model == PINHOLE:
         return {}
@@ -215,7 +215,7 @@ def take_lens(document: Document, lens: FileLens) -> dict[str, Any]:
 
 
 def _value(entry: Entry) -> float:
-    """The number of an entry; NaN, which is not 0, if it is none."""
+    """Return the number of an entry; NaN, which is not 0, if it has none."""
     try:
         return parse_number(entry.value) if isinstance(entry.value, str) else float("nan")
     except ValueError:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A line scanner for the YAML dialect of OpenCV (ORB-SLAM settings, EuRoC ``sensor.yaml``).
 
-OpenCV's own reader hides doubled keys and turns bad numbers into 0 or 3.4e38; generic YAML
-libraries refuse the first line ``%YAML:1.0`` and ``key:[1, 2]`` without a blank. This scanner
-keeps every value as text together with its line, so that the caller can say what is wrong where.
+OpenCV's own reader hides repeated keys and turns bad numbers into 0 or 3.4e38; generic YAML
+libraries refuse the first line ``%YAML:1.0`` and ``key:[1, 2]`` without a space. This scanner keeps
+every value as text together with its line, so that messages can name the line.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ _NOT_FINITE = re.compile(r"^[+-]?\.?(nan|inf|infinity)$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Problem:
-    """Something wrong with a file; `line` counts from 1, None if no line is to blame."""
+    """An error of a file; `line` counts from 1, None if it is not in one line."""
 
     line: int | None
     text: str
 
     def located(self, path: object) -> str:
-        """``path:line: text``, the form that editors jump to."""
+        """``path:line: text``, the format that editors can open."""
         return f"{path}:{self.line}: {self.text}" if self.line else f"{path}: {self.text}"
 
 
@@ -46,7 +46,7 @@ class Entry:
 
 @dataclass
 class Document:
-    """The entries of a file by key (the first of doubled ones) and what was wrong with it."""
+    """The entries of a file by key (the first of repeated ones), and its errors."""
 
     entries: dict[str, Entry] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
@@ -65,13 +65,13 @@ def scan(text: str) -> Document:
     Parameters
     ----------
     text
-        The whole file. The ``%YAML`` line is optional, ``---`` and ``...`` are skipped.
+        The whole file. The ``%YAML`` line is optional; ``---`` and ``...`` are skipped.
 
     Returns
     -------
     Document
-        Keys in the order of the file; lines that are not ``key: value``, unclosed lists and
-        doubled keys are reported as problems.
+        Keys in the order of the file. Lines that are not ``key: value``, unclosed lists and
+        repeated keys are reported as problems.
     """
     document = Document()
     lines = _content_lines(text)
@@ -85,7 +85,7 @@ def parse_number(text: str) -> float:
     Raises
     ------
     ValueError
-        With a sentence for the user if the text is no finite decimal number.
+        If the text is no finite decimal number; the message is a sentence for the user.
     """
     if _NUMBER.match(text):
         value = float(text)
@@ -98,12 +98,12 @@ def parse_number(text: str) -> float:
 
 
 def read_number(entry: Entry) -> float:
-    """Make the finite number of a scalar entry.
+    """Return the finite number of a scalar entry.
 
     Raises
     ------
     ValueError
-        With a sentence for the user that begins with the key.
+        The message is a sentence for the user that begins with the key.
     """
     if not isinstance(entry.value, str):
         raise ValueError(f"{entry.key} must be one number, not a list or a map")
@@ -114,12 +114,12 @@ def read_number(entry: Entry) -> float:
 
 
 def read_matrix(entry: Entry) -> FloatArray:
-    """Make the float64 (rows, cols) matrix of an entry with rows, cols and data.
+    """Return the float64 (rows, cols) matrix of an entry with rows, cols and data.
 
     Raises
     ------
     ValueError
-        With a sentence for the user.
+        The message is a sentence for the user.
     """
     if not isinstance(entry.value, Mapping):
         raise ValueError(f"{entry.key} must be a matrix with rows, cols and data")
@@ -147,10 +147,10 @@ def read_matrix(entry: Entry) -> FloatArray:
 
 
 def flat(document: Document) -> dict[str, Entry]:
-    """Name nested entries by their path (``Camera.fx``), as files without blocks do.
+    """Name nested entries by their path (``Camera.fx``), as in files without blocks.
 
-    Matrices stay as they are. Entries that are given both ways are added to the problems of the
-    document.
+    Matrices are not changed. Entries that the file has in both forms are added to the problems of
+    the document.
     """
     found: dict[str, Entry] = {}
     _flatten(document.entries, "", found, document.problems)
@@ -200,7 +200,7 @@ def _without_comment(line: str) -> str:
 def _scan_block(
     lines: list[_Line], start: int, indent: int, problems: list[Problem]
 ) -> tuple[dict[str, Entry], int]:
-    """Read entries from `start` until a line is indented less; returns them and that line."""
+    """Read entries from `start` to the first less indented line; return them and that line."""
     entries: dict[str, Entry] = {}
     position = start
     while position < len(lines) and lines[position].indent >= indent:

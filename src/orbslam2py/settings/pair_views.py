@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the two raw cameras of a stereo pair look to each other."""
+"""Relative view of the two raw cameras of a stereo pair."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ _View = tuple[FloatArray, tuple[int, int]]
 
 @dataclass(frozen=True)
 class PairViews:
-    """How the two raw cameras of a pair look to each other.
+    """Relative view of the two raw cameras of a pair.
 
     Attributes
     ----------
     turned
         Angle of the rotation from one to the other, degrees.
     overlap
-        Part of one camera's view of far things that the other one sees, 0 to 1: the larger of both.
+        Share of one camera's view of distant points that the other one sees, 0 to 1: the larger of
+        both.
     """
 
     turned: float
@@ -43,7 +44,7 @@ class PairViews:
 
 
 def is_likely_baseline(baseline: float) -> bool:
-    """Whether a pair may have this distance [m]: most others are of another unit."""
+    """Return whether this baseline [m] is plausible: most others are in another unit."""
     return _LEAST_BASELINE <= baseline <= MOST_BASELINE
 
 
@@ -57,7 +58,7 @@ def views_of_pair(pair: StereoRectification) -> PairViews:
 
 
 def compare_views(left: _View, right: _View, R_right_left: FloatArray) -> PairViews:
-    """Compare the views of two cameras; their distortion is left out.
+    """Compare the views of two cameras, without distortion.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def compare_views(left: _View, right: _View, R_right_left: FloatArray) -> PairVi
 
 
 def _seen_part(one: _View, other: _View, R_other_one: FloatArray) -> float:
-    """Part of the view of one camera that the other one sees."""
+    """Return the share of the view of one camera that the other one sees."""
     (K, (width, height)), (K_other, size) = one, other
     u, v = np.meshgrid(np.linspace(0, width - 1, _COLUMNS), np.linspace(0, height - 1, _ROWS))
     pixels = np.stack([u.ravel(), v.ravel(), np.ones(u.size)])

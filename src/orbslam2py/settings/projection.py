@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From points to the image plane, through the lens.
+"""Projection of points to the image plane, through the lens.
 
 The distortion is OpenCV's radial-tangential model (D. C. Brown, "Close-range camera calibration",
 1971): with s = x^2 + y^2 the radius is multiplied by 1 + k1 s + k2 s^2 + k3 s^3. The rational model
@@ -31,14 +31,13 @@ def on_image_plane(points: FloatArray, distortion: FloatArray | None) -> FloatAr
     points
         In the camera frame, float64 (n, 3).
     distortion
-        Coefficients of the lens in OpenCV's order, float64 (4,), (5,) or (8,); None leaves the lens
-        out.
+        Coefficients of the lens in OpenCV's order, float64 (4,), (5,) or (8,); None: no distortion.
 
     Returns
     -------
     FloatArray
-        x, y, float64 (n, 2): pixels but for focal lengths and principal point. NaN where z is not
-        above 0, and beyond `largest_radius`.
+        x, y, float64 (n, 2): pixels before focal lengths and principal point are applied. NaN
+        unless z is above 0, and beyond `largest_radius`.
     """
     z = np.where(points[:, 2] > 0, points[:, 2], np.nan)
     plane = np.asarray(points[:, :2] / z[:, None])
@@ -50,7 +49,7 @@ def on_image_plane(points: FloatArray, distortion: FloatArray | None) -> FloatAr
 
 
 def distorted(plane: NDArray[Real], distortion: FloatArray) -> NDArray[Real]:
-    """Move points on the plane at distance 1 to where the lens draws them.
+    """Apply the distortion to points on the plane at distance 1.
 
     Parameters
     ----------
@@ -81,10 +80,10 @@ def distorted(plane: NDArray[Real], distortion: FloatArray) -> NDArray[Real]:
 
 
 def largest_radius(distortion: FloatArray) -> float:
-    """Find the radius up to which a lens draws what is farther aside farther outside.
+    """Find the radius up to which the distorted radius increases with the undistorted one.
 
-    It is where the derivative of the distorted radius r N(r^2) / D(r^2) first becomes 0, or where
-    D, the polynomial of k4, k5, k6, first does; infinite if neither ever does.
+    It is the first zero of the derivative of the distorted radius r N(r^2) / D(r^2), or of D, the
+    polynomial of k4, k5, k6; infinite if there is none.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Raw stereo pairs as ORB-SLAM3 and stella_vslam describe them, and their rectification."""
+"""Raw stereo pairs in the formats of ORB-SLAM3 and stella_vslam, and their rectification."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ RECTIFIER_KEYS = tuple(
 
 @dataclass(frozen=True)
 class RawPair:
-    """How a raw pair is rectified, and what the rectified cameras are.
+    """The rectification of a raw pair, and its rectified cameras.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ def rectified_pair(
     Parameters
     ----------
     entries
-        Those of the file by our names: the first camera and the size of the images.
+        The entries of the file by our names: the first camera and the size of the images.
     second
         ``Camera2.*`` and ``Stereo.T_c1_c2``, or ``Tlr``.
     problems
@@ -77,7 +77,7 @@ def rectified_pair(
     Returns
     -------
     RawPair or None
-        None if something is wrong.
+        None if there is an error.
     """
     line = min(entry.line for entry in second.values())
     pose_entry = second.get(RELATIVE_POSE) or second.get(OLD_POSE)
@@ -131,7 +131,7 @@ def stella_pair(
     problems: list[Problem],
     model: str = PINHOLE,
 ) -> RawPair | None:
-    """Read the rectification that stella_vslam's ``StereoRectifier`` tells; see `rectified_pair`.
+    """Read the rectification of stella_vslam's ``StereoRectifier``; see `rectified_pair`.
 
     The first camera is the rectified one there; `model` is that of the raw ones.
     """

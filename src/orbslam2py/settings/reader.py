@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An ORB-SLAM settings file to groups of settings, with every problem reported at once.
+"""Reads an ORB-SLAM settings file into groups of settings, and reports all problems at once.
 
-`Settings` is made of the groups by whoever asked for them, so that nothing here needs to know it.
+The caller makes `Settings` from the groups, so that nothing here depends on it.
 """
 
 from __future__ import annotations
@@ -86,24 +86,24 @@ def read_groups(
 ) -> SettingsGroups:
     """Read a settings file for a sensor.
 
-    What is allowed but probably a mistake is not looked at here: see `Settings.doubts`.
+    Values that are allowed but probably wrong are not checked here: see `Settings.doubts`.
 
     Parameters
     ----------
     path
         The file, in OpenCV's YAML dialect.
     sensor
-        What to read it for: keys that only other sensors use are not looked at.
+        The sensor: keys that only other sensors use are ignored.
     allow_unknown
-        Log keys nobody knows as warnings instead of refusing the file.
+        Log unknown keys as warnings instead of refusing the file.
     warn
-        Takes the warnings; by default the log.
+        Gets the warnings; by default the log.
 
     Raises
     ------
     SettingsError
-        If the file cannot be read, or listing everything that is wrong: file, line, key, allowed
-        values, nearest key.
+        If the file cannot be read, or with a list of all errors: file, line, key, allowed values,
+        nearest key.
     """
     return groups_of_text(read_text(path), path, sensor, allow_unknown=allow_unknown, warn=warn)
 
@@ -116,7 +116,7 @@ def groups_of_text(
     allow_unknown: bool,
     warn: Callable[[str], None] = _log.warning,
 ) -> SettingsGroups:
-    """Read the text of a settings file; the path says where it is from. See `read_groups`."""
+    """Read the text of a settings file; the path is its source. See `read_groups`."""
     document = translate(scan(text), sensor)
     given = flat(scan(text))
     if not any(schema.is_known(name) or is_translated(name) for name in given):
@@ -174,7 +174,7 @@ def _camera(values: dict[str, Any], lens: FileLens, path: Path) -> CameraSetting
 
 
 def _served_by(document: Document) -> list[Sensor]:
-    """Sensors all of whose required keys are there."""
+    """Return the sensors whose required keys exist."""
     required = [key for key in schema.KEYS if key.required]
     return [
         sensor
@@ -196,7 +196,7 @@ def _raise_if_any(path: Path, problems: list[Problem], advice: list[str]) -> Non
 
 
 def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:
-    """Raise `SettingsError` with the command to use, if this is another program's calibration."""
+    """Raise `SettingsError` with the right command, if this is another program's calibration."""
     file_format = recognise_camera_file(text)
     if file_format is not None:
         raise SettingsError(
@@ -206,7 +206,7 @@ def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:
 
 
 def _check_names(document: Document, path: Path, *, allow_unknown: bool) -> list[str]:
-    """Find keys that must not be read past; what is to be said of the others."""
+    """Return the unknown keys that are errors, and warnings about the others."""
     unused, notes = [], []
     for name, entry in document.entries.items():
         if schema.is_known(name):

@@ -18,10 +18,10 @@ def rectification_of_pair(
     T_right_left: FloatArray,
     size: tuple[int, int],
 ) -> StereoRectification:
-    """Find the rectification of a calibrated pair.
+    """Compute the rectification of a calibrated pair.
 
-    Both principal points become equal (zero disparity at infinity) and the images are zoomed until
-    no black border is left (OpenCV's alpha 0).
+    Both principal points become equal (zero disparity at infinity), and the images are scaled until
+    there is no black border (OpenCV's alpha 0).
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def rectification_of_pair(
     Raises
     ------
     SettingsError
-        If the cameras stand in one place, or there is no rectification.
+        If the baseline is 0, or there is no rectification.
     """
     if not np.any(T_right_left[:3, 3]):
         raise SettingsError(

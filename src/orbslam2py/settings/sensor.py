@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The three kinds of cameras the system knows."""
+"""The three kinds of sensors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from orbslam2py.errors import SettingsError
 
 
 class _NamedByText(EnumMeta):
-    """Refuses what is no text before Python compares it with each member, as arrays cannot be."""
+    """Refuses objects that are no text, because arrays cannot be compared with members."""
 
     def __call__(cls, value: Any, *more: Any, **named: Any) -> Any:
         if not isinstance(value, str):
@@ -20,7 +20,7 @@ class _NamedByText(EnumMeta):
 
 
 class Sensor(str, Enum, metaclass=_NamedByText):
-    """What delivers the images; the values are the names used on the command line."""
+    """The sensor; the values are the names on the command line."""
 
     MONOCULAR = "mono"
     STEREO = "stereo"
@@ -28,7 +28,7 @@ class Sensor(str, Enum, metaclass=_NamedByText):
 
     @classmethod
     def _missing_(cls, value: object) -> Sensor:
-        """Take other spellings: ``"RGB-D"``, ``"monocular"``."""
+        """Accept other spellings: ``"RGB-D"``, ``"monocular"``."""
         text = str(value).lower().replace("-", "").replace(" ", "")
         for sensor in cls:
             if text in (sensor.value, sensor.name.lower()):

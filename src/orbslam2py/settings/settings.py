@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Everything the system must know about a camera, from a file, a built-in name or Python.
+"""All settings of a camera, from a file, a built-in name or Python.
 
 >>> settings = Settings.load("my_camera.yaml", Sensor.RGBD)  # doctest: +SKIP
 >>> settings.close_depth  # doctest: +SKIP
@@ -50,18 +50,18 @@ _MAY_BE_MISSING = ("depth", "rectification", "right")
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything the system must know about a camera before the first image.
+    """All that the system must know about a camera before the first image.
 
     Attributes
     ----------
     sensor
-        What the settings are for; may be given as text.
+        The sensor of the settings; may be given as text.
     camera, orb
         The camera (rectified, or the left one of a fisheye pair) and the extraction. For one camera
         `CameraSettings.bf`, which it does not have, becomes 0; for a fisheye pair it follows from
         `right`.
     depth
-        For stereo and RGB-D; None for one camera, whatever is given.
+        For stereo and RGB-D; always None for a single camera.
     rectification
         How raw stereo pairs are rectified before they are tracked; None if they come rectified, or
         are a fisheye pair.
@@ -73,7 +73,7 @@ class Settings:
     Raises
     ------
     SettingsError
-        Naming all values that are wrong, by the keys of the settings file.
+        The message names all invalid values by the keys of the settings file.
     """
 
     sensor: Sensor
@@ -148,7 +148,7 @@ class Settings:
 
     @property
     def close_depth(self) -> float:
-        """Depth [m] below which one view is enough for a point; infinite for one camera."""
+        """Depth [m] below which one view suffices for a point; infinite for one camera."""
         if self.depth is None:
             return math.inf
         return self.baseline * self.depth.close_factor
@@ -166,11 +166,11 @@ class Settings:
         return self.depth.raw_per_metre
 
     def doubts(self) -> list[str]:
-        """Say what is allowed but probably a mistake, such as a baseline in millimetres."""
+        """Return values that are allowed but probably wrong, such as a baseline in millimetres."""
         return find_doubts(self.sensor, self._groups())
 
     def check_for(self, sensor: Sensor | str) -> None:
-        """Raise `SettingsError` unless these settings were made for the sensor."""
+        """Raise `SettingsError` unless these settings are for this sensor."""
         sensor = Sensor(sensor)
         if self.sensor is not sensor:
             raise SettingsError(
@@ -182,7 +182,7 @@ class Settings:
     def load(
         cls, path: str | PathLike[str], sensor: Sensor | str, *, allow_unknown: bool = False
     ) -> Settings:
-        """Read a settings file of ORB-SLAM2, 3 or stella_vslam, or take built-in ones by name.
+        """Read a settings file of ORB-SLAM2, 3 or stella_vslam, or built-in settings by name.
 
         Logs the `doubts` of a file as warnings.
 
@@ -192,14 +192,14 @@ class Settings:
             The file, in OpenCV's YAML dialect, or a name such as ``tum1`` (see
             `orbslam2py.settings.BUILTIN_NAMES`).
         sensor
-            What to read it for: the same file serves several sensors with different needs.
+            The sensor: one file may serve several sensors.
         allow_unknown
-            Log keys nobody knows as warnings instead of refusing the file.
+            Log unknown keys as warnings instead of refusing the file.
 
         Raises
         ------
         SettingsError
-            Listing everything that is wrong: file, line, key, allowed values, nearest key.
+            With a list of all errors: file, line, key, allowed values, nearest key.
         """
         settings = resolve_settings(path, sensor, allow_unknown=allow_unknown)
         if not is_builtin_name(str(path)):
@@ -208,12 +208,12 @@ class Settings:
         return settings
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write an ORB-SLAM settings file that `load` turns into equal settings.
+        """Write an ORB-SLAM settings file; `load` reads equal settings from it.
 
         Parameters
         ----------
         path
-            The file; replaced only when everything was written.
+            The file; replaced only after everything is written.
 
         Raises
         ------
@@ -239,16 +239,16 @@ class Settings:
 
     @classmethod
     def from_yaml(cls, text: str, sensor: Sensor | str, *, source: str = "settings") -> Settings:
-        """Read the text of a settings file, such as `to_yaml` makes.
+        """Read the text of a settings file, for example from `to_yaml`.
 
         Parameters
         ----------
         text
             In OpenCV's YAML dialect.
         sensor
-            What to read it for.
+            The sensor.
         source
-            Where it is from, for messages.
+            Its source, for messages.
 
         Raises
         ------
@@ -260,7 +260,7 @@ class Settings:
         return cls(sensor=sensor, **groups)
 
     def describe(self) -> list[str]:
-        """Say line by line what a log should hold about these settings."""
+        """Return these settings line by line, for a log."""
         camera, orb = self.camera, self.orb
         lines = [
             f"camera ({self.sensor}): fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, "
@@ -285,7 +285,7 @@ class Settings:
 
 
 def _lens_line(camera: CameraSettings) -> str:
-    """Say what the lens is."""
+    """Describe the lens."""
     if camera.is_fisheye:
         named = zip(LENS_PARAMETERS[camera.model], camera.lens, strict=True)
         kind = "lens" if camera.model == "thin_prism" else "fisheye lens"
@@ -297,7 +297,7 @@ def _lens_line(camera: CameraSettings) -> str:
 
 
 def builtin_settings(name: str, sensor: Sensor | str) -> Settings:
-    """Make the settings of a data set, as published with ORB-SLAM2 for that sensor.
+    """Return the settings of a data set, as published with ORB-SLAM2 for this sensor.
 
     Parameters
     ----------
@@ -305,12 +305,12 @@ def builtin_settings(name: str, sensor: Sensor | str) -> Settings:
         One of `BUILTIN_NAMES`, or a single KITTI sequence (``kitti00`` ... ``kitti12``), in any
         case.
     sensor
-        The variant: stereo and monocular ones differ.
+        The sensor: settings for stereo and mono differ.
 
     Raises
     ------
     SettingsError
-        If there is no such name, or none for that sensor.
+        If there is no such name, or none for this sensor.
     """
     sensor = Sensor(sensor)
     if not isinstance(name, str):
@@ -322,11 +322,11 @@ def builtin_settings(name: str, sensor: Sensor | str) -> Settings:
 def resolve_settings(
     choice: str | PathLike[str] | Settings, sensor: Sensor | str, *, allow_unknown: bool = False
 ) -> Settings:
-    """Make settings of what a user gave: a built-in name, a file, or finished settings.
+    """Return settings from the user's choice: a built-in name, a file, or finished settings.
 
-    Their doubts are not logged: the system that is made with them does.
+    Their doubts are not logged here, but by the system that uses them.
 
-    A name of built-in settings wins over a file of that name; anything else that looks like a
+    A built-in name takes precedence over a file of the same name. Any other text that looks like a
     path (it exists, has a suffix or a folder) is read as a file.
 
     Parameters
@@ -334,14 +334,14 @@ def resolve_settings(
     choice
         The name, the path or the settings.
     sensor
-        What they are wanted for.
+        The sensor.
     allow_unknown
-        Log keys nobody knows as warnings instead of refusing the file.
+        Log unknown keys as warnings instead of refusing the file.
 
     Raises
     ------
     SettingsError
-        If it is neither a name nor a readable and correct file, or made for another sensor.
+        If it is neither a name nor a readable and correct file, or if it is for another sensor.
     """
     sensor = Sensor(sensor)
     if isinstance(choice, Settings):
@@ -360,7 +360,7 @@ def resolve_settings(
 
 
 def looks_like_path(choice: str | PathLike[str]) -> bool:
-    """Whether a choice exists, or has a suffix or a folder."""
+    """Return whether a choice exists as a file, or has a suffix or a folder."""
     path = Path(choice)
     return path.exists() or bool(path.suffix) or len(path.parts) > 1
 

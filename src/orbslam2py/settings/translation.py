@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The keys of ORB-SLAM3 (0.x and 1.0) and stella_vslam, by the names that ours have."""
+"""The keys of ORB-SLAM3 (0.x and 1.0) and stella_vslam, translated to our keys."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _TAKEN = frozenset(
 
 @dataclass
 class Translated(Document):
-    """The entries of a settings file by our names; each keeps the key that the file has.
+    """The entries of a settings file by our names; each keeps its key in the file.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Translated(Document):
     right
         The right camera of a fisheye pair.
     unreadable
-        Our keys whose values could not be found because of a problem that is in the list.
+        Our keys whose values are missing because of a problem that is in the list.
     """
 
     rectification: StereoRectification | None = None
@@ -83,19 +83,19 @@ class Translated(Document):
 
 
 def is_translated(name: str) -> bool:
-    """Whether a key of another program has a meaning here."""
+    """Return whether a key of another program is used here."""
     return name in _TAKEN
 
 
 def translate(document: Document, sensor: Sensor) -> Translated:
-    """Give the entries of a file the names of our keys.
+    """Translate the entries of a file to our keys.
 
     Parameters
     ----------
     document
-        As scanned; its problems are taken over.
+        The scanned file, with its problems.
     sensor
-        What the file is read for: the second camera is looked at for a pair only.
+        The sensor: the second camera is read only for a pair.
     """
     given = flat(document)
     result = Translated(problems=document.problems)
@@ -141,7 +141,7 @@ def _translate_colour_order(result: Translated, given: Mapping[str, Entry]) -> N
 
 
 def _check_size_kept(result: Translated, given: Mapping[str, Entry]) -> None:
-    """Refuse images that are to be made smaller: here they are tracked as they come."""
+    """Refuse images that should be reduced in size: they are tracked in their size."""
     remedy = (
         "ORB-SLAM3 scales the images by it, orbslam2py tracks them as they come. Begin the line "
         "with # to track them at the size that the calibration is for"
@@ -160,7 +160,7 @@ def _check_size_kept(result: Translated, given: Mapping[str, Entry]) -> None:
 
 
 def _translate_baseline(result: Translated, entry: Entry, sensor: Sensor) -> None:
-    """Make ``Camera.bf`` of the baseline in metres."""
+    """Compute ``Camera.bf`` from the baseline in metres."""
     if not sensor.has_depth:
         result.entries.setdefault("Camera.bf", entry)  # not looked at
         return
@@ -220,7 +220,7 @@ def _translate_pair(result: Translated, given: Mapping[str, Entry]) -> None:
 
 
 def _take_raw_camera(result: Translated, given: Mapping[str, Entry]) -> None:
-    """Take the raw left camera, whose images one camera alone delivers, for the rectified one."""
+    """Use the raw left camera instead of the rectified one, for a single camera."""
     model = given.get(RECTIFIER_MODEL)
     fisheye = model is not None and fisheye_model(model.value) is not None
     values = stella_raw_camera(given, result.problems, fisheye=fisheye)
@@ -234,7 +234,7 @@ def _take_raw_camera(result: Translated, given: Mapping[str, Entry]) -> None:
 
 
 def _check_rectified(result: Translated, second: Mapping[str, Entry]) -> None:
-    """See that the second camera of rectified images is the first once more."""
+    """Check that the second camera of rectified images equals the first."""
     for name, entry in second.items():
         first = result.entries.get(name.replace("Camera2.", "Camera."))
         if first is not None and _number(first) == _number(entry):
@@ -248,7 +248,7 @@ def _check_rectified(result: Translated, second: Mapping[str, Entry]) -> None:
 
 
 def _add_usual_features(result: Translated) -> None:
-    """Fill in what stella_vslam may leave out."""
+    """Add values that stella_vslam may omit."""
     width, height = (_number(result.entries.get(f"Camera.{name}")) for name in ("width", "height"))
     n_features = usual_n_features(int(width or 0), int(height or 0))
     usual = {
@@ -264,7 +264,7 @@ def _add_usual_features(result: Translated) -> None:
 
 
 def _number(entry: Entry | None) -> float | None:
-    """The number of an entry; None if it is none."""
+    """Return the number of an entry; None if it has none."""
     if entry is None or not isinstance(entry.value, str):
         return None
     try:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keys of a settings file that nobody here knows: which are errors, and what was meant.
+"""Unknown keys of a settings file: which are errors, and suggestions.
 
-The rule goes by families of names. What describes the camera is used or refused, since a number
-that is read past gives a wrong map without a word. What is nearly one of our keys is refused with
-the right name. All others say how another program works; they are named in one warning.
+The rule uses families of names. A key that describes the camera is used or refused, because an
+ignored number would give a wrong map without a message. A key that is similar to one of ours is
+refused, with the right name. All others belong to other programs; one warning names them.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _MOST_NAMED = 6
 
 
 def problem_of_unknown_key(entry: Entry) -> str | None:
-    """Say what is wrong with a key that is none of ours; None if it may stand in the file."""
+    """Return what is wrong with an unknown key; None if the file may have it."""
     group, _, last = entry.key.rpartition(".")
     if group.partition(".")[0].lower() in _OTHER_GROUPS:
         return None
@@ -61,7 +61,7 @@ def problem_of_unknown_key(entry: Entry) -> str | None:
 
 
 def unused_keys(entries: Iterable[Entry]) -> str | None:
-    """Say which keys are read past, those of one group together; None if none is worth a word."""
+    """Return warnings about ignored keys, one for each group; None if no warning is needed."""
     names: dict[str, None] = {}
     for entry in entries:
         group, dot, last = entry.key.rpartition(".")
@@ -122,7 +122,7 @@ def _plain(word: str) -> str:
 
 
 def _advice(meant: str, entry: Entry) -> str:
-    """Name the right key, and its value where that is counted in another way."""
+    """Return the right key, and its value if that has another unit."""
     if meant == "Stereo.b":
         return f"did you mean {meant} (the baseline in metres)?"
     if meant == "DepthMapFactor" and isinstance(entry.value, str):

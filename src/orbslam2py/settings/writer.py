@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings to the text of an ORB-SLAM settings file."""
+"""Writes settings as the text of an ORB-SLAM settings file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _RATIONAL = ("k4", "k5", "k6")
 
 
 def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
-    """Make the text that reads back as equal settings; numbers keep all their digits."""
+    """Return a text that reads back as equal settings; numbers keep all their digits."""
     lines = ["%YAML:1.0", f"# Settings for sensor {sensor}"]
     for group, title in _TITLES.items():
         values = groups[group]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The method: tracking, local mapping, loop closing, their threads, and the system around them.
 
-Its front door is the package itself: ``orbslam2py.System``.
+Users import it from the package itself: ``orbslam2py.System``.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map and the workers that tend it: local mapping, loop closing, full bundle adjustment."""
+"""The map and its workers: local mapping, loop closing, full bundle adjustment."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ RESET_PATIENCE = 60.0
 
 
 class BackEnd:
-    """Everything behind tracking, and its life cycle.
+    """All parts behind tracking, from their start to their end.
 
     Parameters
     ----------
     sensor : Sensor
-        What the images come from.
+        The sensor.
     options : SystemOptions
         How to work.
     config : Config
         Thresholds.
     callbacks : Callbacks
-        Who wants to know what happens.
+        Receives events.
     """
 
     def __init__(
@@ -97,28 +97,28 @@ class BackEnd:
 
     @property
     def map_workers(self) -> tuple[Worker[int], ...]:
-        """Those that change the map, in the order in which they hand work on."""
+        """The workers that change the map, in the order in which they pass keyframes on."""
         return self.mapping.worker, self.loop_closing.worker, self.adjustment.worker
 
     @property
     def workers(self) -> tuple[Worker[Any], ...]:
-        """Those, and the one that delivers events."""
+        """The workers that change the map, and the one that delivers events."""
         return (*self.map_workers, self.events.worker)
 
     def reset(self, timeout: float, *, keep: Callable[[], None]) -> None:
-        """Drop the map, and all work on it.
+        """Drop the map and all work that is queued for it.
 
         Parameters
         ----------
         timeout : float
-            Seconds to wait for each worker before it is an error.
+            Seconds to wait for each worker; then an error is raised.
         keep : callable
-            Called when nobody works on the map any more, before it is dropped.
+            Called after all workers have stopped, before the map is dropped.
 
         Raises
         ------
         WorkerError
-            Naming the worker that did not end its step in time.
+            If a worker does not end its step in time; the message names it.
         """
         for worker in self.map_workers:
             worker.reset(timeout)
@@ -131,16 +131,16 @@ class BackEnd:
         self.events.post(MapChanged(ended, MapChangeCause.RESET))
 
     def drop_map(self, map_index: int, timeout: float, *, keep: Callable[[int], None]) -> bool:
-        """Drop the active map alone: the youngest of the others becomes the active one.
+        """Drop only the active map; the youngest of the others becomes active.
 
         Parameters
         ----------
         map_index : int
-            Its number. If it has become part of another one meanwhile, nothing is dropped.
+            Its number. If it has been merged into another one meanwhile, nothing is dropped.
         timeout : float
             Seconds to wait for each worker.
         keep : callable
-            Called with its number when nobody works on it any more, before it is dropped.
+            Called with the number of the map after its workers have stopped, before it is dropped.
 
         Returns
         -------
@@ -150,7 +150,8 @@ class BackEnd:
         Raises
         ------
         WorkerError
-            Naming the worker that has not ended its work in time; the map is as it was.
+            If a worker does not end its step in time; the message names it, and the map is
+            unchanged.
         """
         # Only tracking, which waits here, gives them work. No keyframe that waits may die.
         for worker in (self.mapping.worker, self.loop_closing.worker):
@@ -173,12 +174,12 @@ class BackEnd:
         timeout : float or None
             Seconds; None: for ever.
         close_loop : bool
-            Then close the loop that waits for a better one, if one does, and wait for what follows.
+            If a loop waits for a better one, close it, and wait for the work that follows.
 
         Returns
         -------
         bool
-            False when the time passed first, or a worker holds work back for a pause that may last.
+            False if the time is over first, or if a worker holds work back during a long pause.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
 
@@ -197,7 +198,7 @@ class BackEnd:
     def finish(
         self, *, drain: bool, wait_for_adjustment: bool, timeout: float | None
     ) -> list[Exception]:
-        """End the workers; returns what went wrong."""
+        """End the workers; return their errors."""
         errors: list[Exception] = []
         for worker in self.workers:
             wait = drain and (wait_for_adjustment or worker is not self.adjustment.worker)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much work goes into the map; ``docs/guide/tuning.md#effort`` has what each gives."""
+"""How much work goes into the map; ``docs/guide/tuning.md#effort`` compares the presets."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What happens in a running system, for callbacks: plain data, delivered outside of its threads.
+"""Events of a running system, for callbacks: plain data, delivered in a separate thread.
 
 >>> def closed(event: LoopClosed) -> None:
 ...     print(f"loop {event.current_keyframe} -> {event.matched_keyframe}")
@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class LoopClosed(EqualByValue):
-    """A place was seen again, and the drift gathered meanwhile was taken out."""
+    """A loop was closed: the camera is at a known place, and the drift was corrected."""
 
     map_index: int
     """As in `TrackingRecord.map_index`."""
@@ -40,29 +40,30 @@ class LoopClosed(EqualByValue):
     n_matches: int
     """Keypoints of the current keyframe that show points around the matched one."""
     n_fused: int
-    """Points that were found to be the same on both sides."""
+    """Map points that were fused, because both sides of the loop have them."""
     scale: float
-    """Lengths around the current keyframe were multiplied by it; 1 with stereo and RGB-D."""
+    """Factor of the correction on lengths around the current keyframe; 1 with stereo and RGB-D."""
     S_cm: FloatArray
     """(4, 4) similarity: camera of the matched keyframe to camera of the current one."""
     translation: float
-    """Metres (one camera: the map's own units) by which the current keyframe was moved."""
+    """Translation of the current keyframe by the correction, metres (one camera: the map's
+    units)."""
     rotation_deg: float
-    """Degrees by which it was turned."""
+    """Rotation of the current keyframe by the correction, degrees."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per step: detect, verify, wait, plan, graph, apply."""
 
 
 @dataclass(frozen=True, eq=False)
 class KeyframeAdded(EqualByValue):
-    """Local mapping is through with a new keyframe."""
+    """Local mapping has finished a new keyframe."""
 
     map_index: int
     keyframe: int
     timestamp: float
     """Seconds."""
     T_wc: FloatArray
-    """(4, 4) camera to world, as it is now."""
+    """(4, 4) camera to world, after mapping."""
     n_keyframes: int
     """In the map."""
     n_map_points: int
@@ -70,7 +71,7 @@ class KeyframeAdded(EqualByValue):
 
 @dataclass(frozen=True)
 class MapStarted:
-    """A map has begun: the first one, or one after a reset, or beside those that rest."""
+    """A map has begun: the first one, one after a reset, or one beside inactive maps."""
 
     map_index: int
     frame_id: int
@@ -80,12 +81,12 @@ class MapStarted:
 
 @dataclass(frozen=True, eq=False)
 class MapsMerged(EqualByValue):
-    """Two maps showed the same place and are one now, in the world of the older one."""
+    """Two maps showed the same place and were merged, in the world of the older one."""
 
     map_index: int
-    """The older map, which goes on."""
+    """The older map, which remains."""
     merged_map: int
-    """The younger one, which is part of it now."""
+    """The younger map, which is now part of the older one."""
     current_keyframe: int
     matched_keyframe: int
     """The keyframe of the other map that showed the place before."""
@@ -97,20 +98,20 @@ class MapsMerged(EqualByValue):
     n_matches: int
     """Keypoints of the current keyframe that show points around the matched one."""
     n_fused: int
-    """Points that were found to be the same in both maps."""
+    """Map points that were fused, because both maps have them."""
     n_moved_keyframes: int
     n_moved_points: int
     S_km: FloatArray
     """(4, 4) similarity: world of the younger map to that of the older one."""
     scale: float
-    """Its scale: lengths of the younger map were multiplied by it; 1 with stereo and RGB-D."""
+    """Scale of the similarity, a factor on lengths of the younger map; 1 with stereo and RGB-D."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per step: detect, verify, wait, plan, apply, weld, graph."""
 
 
 @dataclass(frozen=True)
 class TrackingLost:
-    """No pose was found for an image, after one that had one."""
+    """An image has no pose, but the one before had one."""
 
     map_index: int
     frame_id: int
@@ -120,7 +121,7 @@ class TrackingLost:
 
 @dataclass(frozen=True, eq=False)
 class Relocalized(EqualByValue):
-    """A pose was found again."""
+    """An image has a pose, but the one before had none."""
 
     map_index: int
     frame_id: int
@@ -130,7 +131,7 @@ class Relocalized(EqualByValue):
 
 
 class MapChangeCause(str, enum.Enum):
-    """Why the map as a whole is another one than before."""
+    """Why the whole map has changed."""
 
     LOOP = "loop"
     """A loop was closed."""
@@ -147,7 +148,7 @@ class MapChangeCause(str, enum.Enum):
 
 @dataclass(frozen=True)
 class MapChanged:
-    """Poses and points moved as a whole: what was drawn before is out of date."""
+    """Poses and points have moved: drawings of them are out of date."""
 
     map_index: int
     cause: MapChangeCause
@@ -155,18 +156,19 @@ class MapChanged:
 
 @dataclass(frozen=True)
 class Callbacks:
-    """Functions that are told what happens.
+    """Functions that receive events.
 
-    They run one after the other in a thread of their own (in deterministic mode: in the thread of
-    the track call), so that a slow one delays neither tracking nor mapping, and hold no lock of the
-    system; they may call the system's methods. In deterministic mode the image is not done before
-    they are, so that what would wait for its end (`System.wait_until_idle`, `System.run`) raises
-    `StateError`. An exception is logged and goes no further.
+    They run one after the other in a separate thread (in deterministic mode: in the thread of the
+    track call). A slow function therefore delays neither tracking nor mapping. They hold no lock of
+    the system and may call its methods. In deterministic mode the image ends only after its
+    callbacks. A call that waits for this end (`System.wait_until_idle`, `System.run`) therefore
+    raises `StateError` in a callback. An exception in a callback is logged and does not stop the
+    system.
 
     Raises
     ------
     SettingsError
-        If one of them cannot be called.
+        If one of them is not callable.
     """
 
     on_loop: Callable[[LoopClosed], None] | None = None
@@ -188,7 +190,7 @@ class Callbacks:
 
     @classmethod
     def of(cls, value: Callbacks | None) -> Callbacks:
-        """Take callbacks, or nobody who wants to know.
+        """Take callbacks, or None for no callbacks.
 
         Raises
         ------
@@ -208,14 +210,14 @@ Event = (
 
 
 class EventDispatcher:
-    """Delivers events to the user's functions, in order.
+    """Delivers events to the functions of the user, in order.
 
     Parameters
     ----------
     callbacks : Callbacks
         Who wants to know.
     threaded : bool
-        In a thread of its own, or inline.
+        Whether to use a separate thread; otherwise inline.
     """
 
     def __init__(self, callbacks: Callbacks, *, threaded: bool) -> None:
@@ -241,11 +243,11 @@ class EventDispatcher:
             deliver()
 
     def wanted(self, kind: type[Event]) -> bool:
-        """Whether anybody listens to events of a type: others need not be made."""
+        """Return whether a callback listens to this type of event."""
         return self._listeners[kind] is not None or bool(self.watchers)
 
     def post(self, event: Event) -> None:
-        """Queue an event for those who listen to its type; nothing if there are none."""
+        """Queue an event for the callbacks of its type; nothing if there are none."""
         listener = self._listeners[type(event)]
         listeners = (*(() if listener is None else (listener,)), *self.watchers)
         if not listeners:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keeps where every frame was, so that trajectories follow what becomes of the map."""
+"""Keeps the poses of all frames, so that trajectories follow later changes of the map."""
 
 from __future__ import annotations
 
@@ -31,25 +31,24 @@ class _YoungFrame(NamedTuple):
 
 
 class FrameRecorder:
-    """The path of the camera through the present maps, and through those that ended before.
+    """The trajectory of the camera in the present maps and in those that have ended.
 
-    A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
-    map later. In the end, or when many frames have come after it, it is estimated once more from
-    the points it saw, each of which has moved in its own way. One that was in doubt, or came while
-    a single camera's map was young, is matched with the map once more as well
-    (``docs/method/map.md``, settled frames). May be used from any thread, also while a frame is
-    recorded.
+    The pose of a frame is stored relative to its reference keyframe, so it moves with the map. At
+    the end, or after many further frames, it is estimated again from its points, because each of
+    them has moved separately. A frame that was uncertain, or that is among the first of a single
+    camera's map, is also matched with the map again (``docs/method/map.md``, settled frames). The
+    methods may be called from any thread, also while a frame is recorded.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map that the frames were tracked in.
     reestimation : FrameReestimation
-        Matches frames with the map again.
+        Matches frames with the map again, after many further frames.
     every_frame : bool
-        `reestimation` gets every frame, when many have come after it at the latest.
+        `reestimation` gets every frame, not only uncertain ones.
     uncertain_frames : bool
-        It gets frames whose pose was uncertain.
+        `reestimation` gets frames whose pose was uncertain.
     """
 
     def __init__(
@@ -84,9 +83,9 @@ class FrameRecorder:
         return len(self._young or ())
 
     def begin(self, earlier: Sequence[core.TrackedFrame]) -> None:
-        """Keep the first frames of a map, which `reestimate_first_frames` will give new poses to.
+        """Keep the first frames of a map, so that `reestimate_first_frames` can match them again.
 
-        Those of them that had been recorded as lost have been found.
+        Frames recorded as lost now have poses.
         """
         with self._lock:
             self._record_waiting()
@@ -96,7 +95,7 @@ class FrameRecorder:
                 self._append(frame, lost=False)
 
     def reestimate_first_frames(self) -> None:
-        """Record the frames since `begin` anew, with their poses in the map as it is now."""
+        """Record the frames since `begin` again, with their poses in the present map."""
         with self._lock:
             self._record_waiting()
             young, self._young = self._young or [], None
@@ -107,7 +106,7 @@ class FrameRecorder:
                     self._keep_keypoints(again, in_doubt=False)
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
-        """Write down a frame that came after all others."""
+        """Record a frame that is later than all others."""
         self._write(frame, lost=lost, fixed_map=fixed_map)
         if not lost and frame.map_index != self._young_map:
             self._young = None
@@ -115,7 +114,7 @@ class FrameRecorder:
             self._young.append(_YoungFrame(frame, lost, fixed_map))
 
     def _write(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
-        """Write down a frame, in place of what was written of it before."""
+        """Record a frame in place of its earlier record."""
         self._recorder.record(self._map, frame, lost=lost)
         if lost or fixed_map:
             self._sightings.forget(frame.id)
@@ -125,7 +124,7 @@ class FrameRecorder:
         self._last_map = max(self._last_map, frame.map_index)
 
     def doubt(self, frame: core.TrackedFrame) -> None:
-        """Take back the pose of this frame, recorded next, if the one after it is lost."""
+        """Withdraw the pose of the frame that is recorded next, if the frame after it is lost."""
         self._doubted = frame
 
     def record(
@@ -136,7 +135,7 @@ class FrameRecorder:
         fixed_map: bool = False,
         in_doubt: bool = False,
     ) -> None:
-        """Keep a frame; a lost one is noted without a pose of its own.
+        """Record a frame; a lost one has no pose of its own.
 
         Parameters
         ----------
@@ -145,10 +144,10 @@ class FrameRecorder:
         lost : bool
             Whether it has no pose.
         fixed_map : bool
-            The map does not change: there is nothing for its pose to follow.
+            The map is fixed, so the pose need not follow it.
         in_doubt : bool
-            Its pose was searched for harder than usual, or little speaks for it: the finished map
-            may say more.
+            Its pose is uncertain or needed a search of other hypotheses: the finished map may
+            improve it.
         """
         with self._lock:
             self._record_waiting(believed=not lost)
@@ -165,7 +164,7 @@ class FrameRecorder:
                 self._keep_keypoints(frame, in_doubt=in_doubt)
 
     def _keep_keypoints(self, frame: core.TrackedFrame, *, in_doubt: bool) -> None:
-        """Let a frame be matched again later; of too many, the oldest is now or not at all."""
+        """Queue a frame to be matched again later; a full queue handles its oldest frame now."""
         waiting = self._with_keypoints
         waiting[frame.id] = (frame, in_doubt)
         if self._every_frame:
@@ -178,7 +177,7 @@ class FrameRecorder:
             del waiting[min(alike)]
 
     def _record_waiting(self, *, believed: bool = True) -> None:
-        """Record the frame that waits for the next one; who asks before that gets its pose."""
+        """Record the frame that waits for the next one; called when its pose is needed earlier."""
         frame, self._waiting = self._waiting, None
         if frame is None:
             return
@@ -188,12 +187,12 @@ class FrameRecorder:
         self._append(frame, lost=not believed)
 
     def settle(self) -> None:
-        """Estimate the poses of the frames that wait for it: the map is finished."""
+        """Estimate the poses of the waiting frames again: the map is finished."""
         with self._lock:
             self._settle()
 
     def _settle(self, only_map: int | None = None) -> None:
-        """Match frames again that wait for it, of all maps or of one, and settle those around."""
+        """Match waiting frames again, of all maps or of one; estimate the others again."""
         self._record_waiting()
         waiting, self._with_keypoints = self._with_keypoints, {}
         for frame, in_doubt in waiting.values():
@@ -204,11 +203,11 @@ class FrameRecorder:
         self._sightings.settle(self._map, self._recorder)
 
     def _map_of(self, frame: core.TrackedFrame) -> int:
-        """The map that a frame lies in by now, which may have become part of another."""
+        """Return the map that contains a frame now; its own map may have been merged."""
         return int(self._map.map_of(frame.reference_keyframe))
 
     def end_maps(self) -> None:
-        """Keep the trajectories of the maps as they are now: they are about to be dropped."""
+        """Keep the trajectories of the maps, which will be dropped next."""
         with self._lock:
             self._settle()
             for map_index in self._living():
@@ -217,7 +216,7 @@ class FrameRecorder:
             self._young = None
 
     def end_map(self, map_index: int) -> None:
-        """Keep the trajectory of one of the maps, which is about to be dropped beside others."""
+        """Keep the trajectory of one map, which will be dropped next; the others remain."""
         with self._lock:
             self._settle(map_index)
             self._ended[map_index] = self._present(map_index)
@@ -225,15 +224,15 @@ class FrameRecorder:
             self._young = None
 
     def trajectory(self) -> Trajectory:
-        """The one in the active map."""
+        """The trajectory in the active map."""
         with self._lock:
             self._record_waiting()
             return self._present(self._map.active_map)
 
     def trajectories(self) -> list[Trajectory]:
-        """One trajectory a map, by its number, relative to its first keyframe.
+        """One trajectory for each map, by its number, relative to its first keyframe.
 
-        That of a map that has become part of another one is empty.
+        The trajectory of a merged map is empty.
         """
         with self._lock:
             self._record_waiting()
@@ -250,10 +249,10 @@ class FrameRecorder:
         Parameters
         ----------
         map_index : int
-            Which map is meant; no frames of another one.
+            Number of the map; frames of other maps are left out.
         known : array of int64 (m,)
-            Ids of the keyframes that are in the file: frames from the first on that hangs on
-            another one are left for the next time.
+            Ids of the keyframes in the file. The first frame that refers to another keyframe, and
+            all later ones, are left for the next save.
         """
         with self._lock:
             self._record_waiting()

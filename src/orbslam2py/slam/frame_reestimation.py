@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames of the past, matched again with the map as it is now.
+"""Past frames, matched again with the present map.
 
 ``docs/method/map.md#settled-frames``.
 """
@@ -22,14 +22,14 @@ _MORE_INLIERS = 1.1
 
 
 class FrameReestimation:
-    """Gives frames that were tracked long ago new poses; the map is only read.
+    """Estimates new poses of past frames; it only reads the map.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     search : PoseSearch
-        The ways to a pose; its own, not the tracker's.
+        Estimates poses; not shared with the tracker.
     """
 
     def __init__(self, slam_map: core.Map, search: PoseSearch) -> None:
@@ -39,19 +39,19 @@ class FrameReestimation:
     def __call__(
         self, frame: core.TrackedFrame, *, in_doubt: bool = False, finished: bool = True
     ) -> core.TrackedFrame:
-        """A version of a frame with its pose in the map as it is now.
+        """Return a copy of a frame with its pose in the present map.
 
-        One that is no longer found, or is a keyframe, keeps the pose that follows its keyframe.
+        A keyframe, or a frame that is not found, keeps the pose that follows its keyframe.
 
         Parameters
         ----------
         frame : TrackedFrame
-            As it was tracked; it stays as it is.
+            The frame as it was tracked; it is not changed.
         in_doubt : bool
-            Its pose may be far off: look further around, and again from where it is then found, as
-            long as that shows clearly more of the map.
+            The pose may be far off: search wide windows, and repeat from the new pose while that
+            finds clearly more points.
         finished : bool
-            No other look will follow: the pose is not to hang on the one that was tracked.
+            The frame is not matched again: the result must not depend on the tracked pose.
         """
         followed = _copy_of(frame)
         if followed.T_cw is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a system tracks: anything that gives images and time stamps, whoever made it."""
+"""What a system can track: any object that gives images and time stamps."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def timed_images(
     Raises
     ------
     StateError
-        If the source was opened for another sensor, or a frame is none.
+        If the source was opened for another sensor, or gives an object that is no frame.
     DatasetError
-        If what should be images is something else.
+        If an object that should be an image is none.
     """
     is_recording = hasattr(source, "timestamps") and hasattr(source, "load")
     if not is_recording and (not isinstance(source, Iterable) or isinstance(source, str | bytes)):
@@ -110,14 +110,14 @@ def timed_images(
 
 
 def check_images(images: object, giver: str) -> None:
-    """See that something is like `orbslam2py.datasets.Images`, at least for a single camera.
+    """Check that an object has the fields of `orbslam2py.datasets.Images` for a single camera.
 
     Parameters
     ----------
     images
         What was given.
     giver
-        What gave it, for the message.
+        Name of its source, for the message.
 
     Raises
     ------
@@ -136,18 +136,17 @@ def arrays_of(
     sensor: Sensor,
     timestamp: float,
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[Any] | None, PairMask | None]:
-    """Take the arrays that a sensor needs of the images of one moment.
+    """Return the arrays that a sensor needs from the images of one moment.
 
     Returns
     -------
     first, second, mask
-        The image; the right image or the depth, None for a single camera; the mask that came with
-        the images.
+        The image; the right image or the depth, None for a single camera; the mask of the images.
 
     Raises
     ------
     ImageError
-        If the image that the sensor needs beside the first is missing, or one is too much.
+        If an image that the sensor needs is missing, or there is one too many.
     """
     if hasattr(images, "image"):
         some: Any = images

@@ -290,7 +290,7 @@ class FrontEnd:
 
 
 def _size_text(image: npt.NDArray[np.generic]) -> str:
-    """Width and height, as people write them."""
+    """Width and height as text."""
     return f"{image.shape[1]}x{image.shape[0]}"
 
 

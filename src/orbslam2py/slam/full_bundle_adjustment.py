@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Full bundle adjustment: all keyframes and points together, while the system goes on.
+"""Full bundle adjustment of all keyframes and points, while the system goes on.
 
 Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-D;
 ``docs/method/adjustment.md#full-bundle-adjustment``.
@@ -35,7 +35,7 @@ class FullAdjustmentRecord:
     """One full bundle adjustment."""
 
     map_index: int
-    """Which map, as in `TrackingRecord.map_index`."""
+    """Number of the map, as in `TrackingRecord.map_index`."""
     n_keyframes: int = 0
     """Keyframes that took part."""
     n_points: int = 0
@@ -44,11 +44,11 @@ class FullAdjustmentRecord:
     iterations: int = 0
     """Accepted steps."""
     initial_cost: float = 0.0
-    """Sum of squared residuals, each over its standard deviation, robustified."""
+    """Sum of squared residuals over their variances, with robust kernel."""
     final_cost: float = 0.0
-    """The same at the end."""
+    """The same sum at the end."""
     used: bool = False
-    """False: given up because of another loop, a reset or the shutdown, or it gained nothing."""
+    """False: stopped by another loop, a reset or the shutdown, or the cost did not fall."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per step: gather, solve, wait, commit, local (if there were new keyframes)."""
 
@@ -56,21 +56,22 @@ class FullAdjustmentRecord:
 class FullBundleAdjustment:
     """Refines the whole map on demand; the fourth worker.
 
-    Solving works on a copy and stops nobody. To write the result back, mapping stands still for a
-    moment; keyframes and points made meanwhile follow those they hang on.
+    It solves a copy of the map, so no other worker waits. Mapping pauses for a moment while the
+    result is written. Keyframes and points that were added meanwhile move with their parent or
+    reference keyframe.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     mapping : Worker
-        Stands still while the result is written.
+        Pauses while the result is written.
     time_limit : float, optional
-        Seconds after which it ends; what was reached by then is used.
+        Time limit in seconds; the result up to then is used.
     monocular : bool
-        The map has no scale of its own.
+        The scale of the map is not known.
     threaded : bool
-        In a thread of its own, or inline.
+        Whether to use a separate thread; otherwise inline.
     on_done : callable
         ``on_done(record)``, after each one.
     """
@@ -108,9 +109,9 @@ class FullBundleAdjustment:
         )
 
     def start(self, map_index: int | None = None) -> int:
-        """Begin one, of the active map if no other is named; a running one is given up.
+        """Start an adjustment, by default of the active map; a running one is stopped.
 
-        None begins while the system ends. Returns its number.
+        None is started during the shutdown. Returns its number.
         """
         self.cancel()
         number = next(self._numbers)
@@ -121,11 +122,11 @@ class FullBundleAdjustment:
     def start_and_wait(
         self, stop: threading.Event | None = None, map_index: int | None = None
     ) -> FullAdjustmentRecord:
-        """Begin one, and wait for its end.
+        """Start an adjustment and wait for its end.
 
-        It is given up when the worker is to stand still for longer (localization mode), and when
-        another one, a reset or the shutdown takes its place, maybe before it has begun: then
-        nothing is counted in its record. Also when `stop` is set.
+        It is stopped if the worker is paused for longer (localization mode), or if another
+        adjustment, a reset or the shutdown replaces it. If it had not begun, its record counts
+        nothing. It is also stopped if `stop` is set.
         """
         number = self.start(map_index)
         worker = self.worker
@@ -150,25 +151,25 @@ class FullBundleAdjustment:
 
     @contextlib.contextmanager
     def kept_away(self) -> Iterator[None]:
-        """Give up a running one, and let none begin or end meanwhile.
+        """Stop a running adjustment, and let none begin or end meanwhile.
 
-        For those that are about to move the map themselves: one that somebody else asks for waits.
+        For callers that move the map themselves: later requests wait.
         """
         with self.worker.pause(brief=True):
             self.cancel()
             yield
 
     def cancel(self, timeout: float | None = None) -> None:
-        """Give up a running one. On return it will not touch the map any more."""
+        """Stop a running adjustment. After the return it does not change the map any more."""
         self.worker.reset(timeout)
 
     def run(self, map_index: int | None = None) -> FullAdjustmentRecord:
-        """Do one now, in the caller's thread; for when the workers have ended."""
+        """Run an adjustment in the caller's thread, after the workers have ended."""
         chosen = self._map.active_map if map_index is None else map_index
         return self._adjust(core.StopFlag(), chosen)
 
     def _refine_newest(self, cancelled: core.StopFlag, map_index: int) -> None:
-        """Fit keyframes that were made meanwhile, and only moved along, to the refined map."""
+        """Adjust keyframes that were added meanwhile to the optimised map."""
         newest = int(core.snapshot_keyframes(self._map, map_index).ids[-1])
         core.local_bundle_adjustment(self._map, newest, cancelled, self._monocular)
 
@@ -222,16 +223,16 @@ class FullBundleAdjustment:
 def optimize_map(
     contents: MapContents, *, time_limit: float | None = None
 ) -> tuple[MapContents, FullAdjustmentRecord]:
-    """Refine all keyframes and points of a map together, as `System.optimize` does.
+    """Optimise all keyframes and points of a map together, as `System.optimize` does.
 
-    Keyframe 0 stays where it is. Without a time limit the same map gives the same bytes.
+    Keyframe 0 does not move. Without a time limit the same map gives the same bytes.
 
     Parameters
     ----------
     contents
         The map, as from `load_map`.
     time_limit
-        Seconds, above 0, after which it ends; what was reached by then is used.
+        Time limit in seconds, above 0; the result up to then is used.
 
     Returns
     -------
@@ -243,9 +244,9 @@ def optimize_map(
     Raises
     ------
     MapFileError
-        If the contents are impossible, or something else.
+        If the contents are inconsistent, or no contents of a map.
     SettingsError
-        If the time limit is none.
+        If the time limit is not a number above 0.
     """
     contents_of(contents)
     if time_limit is not None:

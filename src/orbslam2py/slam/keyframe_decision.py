@@ -18,22 +18,22 @@ _QUEUE = 3  # keyframes that may wait for the mapper, with depth (ORB-SLAM2)
 
 
 class KeyframeDecision:
-    """Weighs what a frame would bring to the map against what mapping can take.
+    """Compares the benefit of a new keyframe with the load of mapping.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     mapping : Worker
-        Takes the keyframes; asked to hurry when it is busy and one is wanted.
+        Local mapping; it shortens its work if it is busy and a keyframe is wanted.
     sensor : Sensor
-        What the images come from.
+        The sensor.
     max_keyframe_interval : int
-        Frames after which one is wanted even from a busy mapper: one second.
+        Frames after which a keyframe is wanted even if mapping is busy: one second.
     config : KeyframeConfig
         Limits.
     waits : bool
-        Images are recorded ones: a frame that is worth it waits for the mapper.
+        Images are recorded: a frame that should become a keyframe waits for mapping.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class KeyframeDecision:
         self._waits = waits
 
     def due(self, frame_id: int, since: SinceKeyframe) -> bool:
-        """Whether a frame may become a keyframe, however well it is tracked."""
+        """Return whether a frame may become a keyframe at all."""
         return frame_id >= since.frame_id + self.spacing
 
     def wanted(
@@ -67,20 +67,20 @@ class KeyframeDecision:
         velocity: Velocity | None,
         since: SinceKeyframe,
     ) -> bool:
-        """Whether a tracked frame is to become a keyframe now.
+        """Return whether a tracked frame becomes a keyframe now.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             With its associations.
         reference_keyframe : int
-            Shares most points with it.
+            The keyframe that shares most points with the frame.
         n_inliers : int
             Of its pose.
         velocity : Velocity or None
             At this frame, if known.
         since : SinceKeyframe
-            What the frames since the last keyframe have seen, this one among them.
+            Counts of the frames since the last keyframe, with this one.
         """
         if self._mapping.pausing:
             return False
@@ -127,10 +127,10 @@ class KeyframeDecision:
         return self.limits.share_of_first if n_keyframes < 2 else self.limits.share
 
     def _hangs_on_few(self, frame: core.TrackedFrame, n_inliers: int, since: SinceKeyframe) -> bool:
-        """Whether a single camera has few points, and has come far enough to place new ones.
+        """Return whether a single camera has few points, and has moved enough to create new ones.
 
-        The reference keyframe says nothing of that: its points count only if three keyframes see
-        them, and few of a fast camera's are seen so often.
+        The reference keyframe cannot decide this: its points count only if three keyframes see
+        them, and a fast camera has few such points.
         """
         limits = self.limits
         T_cw = frame.T_cw
@@ -150,7 +150,7 @@ class KeyframeDecision:
     def _turns_away(
         self, frame: core.TrackedFrame, n_inliers: int, velocity: Velocity | None
     ) -> bool:
-        """Whether what is tracked is about to leave the view, and there are points to follow it."""
+        """Return whether the tracked points will leave the view soon and others can follow."""
         T_nw = frame.T_cw
         if velocity is None or T_nw is None:
             return False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Local mapping: what happens to the map for every new keyframe.
+"""Local mapping: the work on the map for every new keyframe.
 
 Mur-Artal, Montiel and Tardos, 2015, section VI; ``docs/method/mapping.md``.
 """
@@ -18,20 +18,20 @@ from orbslam2py.slam.config import AlignmentConfig, MappingConfig
 class LocalMapping:
     """Integrates keyframes: points, fusion, bundle adjustment, culling.
 
-    A waiting keyframe goes before fusion, bundle adjustment and culling of the present one.
+    If a keyframe waits, fusion, bundle adjustment and culling of the present one are skipped.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     sensor : Sensor
-        Decides what is asked of points.
+        Sets the requirements for new points.
     keyframe_index : orbslam2py._core.KeyFrameIndex
-        Forgets the keyframes that are culled.
+        Removes culled keyframes.
     threaded : bool
-        In a thread of its own, or inline at `start`.
+        Whether to use a separate thread; otherwise `start` works inline.
     adjustment_threads : int
-        Of local bundle adjustment, 1 or 2; the result is the same.
+        Number of threads for local bundle adjustment, 1 or 2; the result is the same.
     config : MappingConfig
         Limits.
     alignment : AlignmentConfig or None
@@ -74,14 +74,14 @@ class LocalMapping:
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
 
     def insert_keyframe(self, keyframe: int) -> None:
-        """Take note of a keyframe; its mapping begins with `start`."""
+        """Store a keyframe; `start` begins its mapping."""
         self._inserted.append(keyframe)
 
     def start(self) -> None:
-        """Queue the inserted keyframes; a running bundle adjustment is asked to end early.
+        """Queue the stored keyframes; a running bundle adjustment is asked to end early.
 
-        Not before the frame is recorded: its pose relative to its keyframe would be wrong once
-        mapping has moved that keyframe.
+        Call it after the frame is recorded: otherwise mapping may move the keyframe before the
+        relative pose of the frame is stored.
         """
         inserted, self._inserted = self._inserted, []
         self.worker.submit(*inserted)
@@ -93,7 +93,7 @@ class LocalMapping:
         self._recent_points.clear()
 
     def process(self, keyframe: int) -> None:
-        """Everything that is done for one keyframe."""
+        """Do all work for one keyframe."""
         timer = StageTimer()
         with timer("mapping"):
             with timer("mapping.insert"):

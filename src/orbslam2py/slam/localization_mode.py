@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Localization mode: poses in a map that stays as it is.
+"""Localization mode: poses in a fixed map.
 
 Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-F;
 ``docs/method/tracking.md#localization-mode``.
@@ -17,16 +17,16 @@ _log = logging.getLogger(__name__)
 
 
 class LocalizationSwitch:
-    """Holds the workers still while only poses are wanted.
+    """Pauses the workers in localization mode.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     min_keyframes : int
-        How many keyframes begin a map; with fewer, mapping goes on until it has begun.
+        Number of keyframes at which a map has begun; with fewer, mapping continues until then.
     workers : iterable of Worker
-        Stand still in localization mode; what waits for them is processed afterwards.
+        Pause in localization mode; waiting keyframes are processed afterwards.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class LocalizationSwitch:
             raise
 
     def release(self) -> None:
-        """Let the workers go on; what waits for them is processed."""
+        """Resume the workers; they process the waiting keyframes."""
         for ticket in self._tickets:
             ticket.release()
         self._tickets = []

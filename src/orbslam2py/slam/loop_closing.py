@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loop closing: recognises places seen before, and takes out the drift gathered meanwhile.
+"""Loop closing: recognises known places and corrects the drift.
 
 Mur-Artal, Montiel and Tardos, 2015, section VII; for stereo and RGB-D the scale is known, Mur-Artal
-and Tardos, 2017, section III-D. Candidates that drift cannot explain, or that contradict each
-other, are refused: places that look alike make perfect matches. Step by step:
+and Tardos, 2017, section III-D. It rejects candidates that drift cannot explain, or that contradict
+each other, because places that look alike give perfect matches. Step by step:
 ``docs/method/loops.md``.
 """
 
@@ -37,29 +37,28 @@ class _Proposals:
     """Keyframes that look like the present one."""
 
     consistent: list[int]
-    """The same part of the map has been proposed by the keyframes before."""
+    """The keyframes before also proposed this part of the map."""
     others: list[int]
 
 
 class LoopClosing:
-    """Third stage of the pipeline: takes every keyframe that local mapping has finished.
+    """Third stage of the pipeline: processes every keyframe after local mapping.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     keyframe_index : orbslam2py._core.KeyFrameIndex
-        Which keyframes contain which words.
+        Index from words to keyframes.
     sensor : Sensor
-        A single camera's scale drifts, others' is known.
+        Whether scale drifts, as with a single camera.
     mapping : Worker
-        Stands still while a loop is closed.
+        Pauses while a loop is closed.
     adjustment : FullBundleAdjustment
-        Kept away while a loop is closed.
+        Stopped while a loop is closed.
     options : SystemOptions
-        Whether loops are closed (otherwise keyframes are only entered into the index, by which lost
-        frames are found again), whether the whole map is adjusted afterwards, the seed of the
-        draws, and whether there is a thread.
+        Whether loops are closed (otherwise keyframes only enter the index, for relocalization),
+        whether full bundle adjustment follows, the seed, and whether there is a thread.
     on_loop : callable
         ``on_loop(event)``, after each loop.
     on_merge : callable
@@ -120,7 +119,7 @@ class LoopClosing:
         )
 
     def insert_keyframe(self, keyframe: int) -> None:
-        """Queue a keyframe, unless a shutdown has begun: mapping may end after loop closing."""
+        """Queue a keyframe, unless the loop closing has been shut down before mapping."""
         self.worker.offer(keyframe)
 
     @property
@@ -129,12 +128,12 @@ class LoopClosing:
         return self._waiting.has_loop
 
     def end(self) -> None:
-        """Close the loop that waits for a better one, if one does: no keyframe follows."""
+        """Close the pending loop, if there is one: no further keyframe follows."""
         if self.worker.threaded or self.has_loop_waiting:
             self.worker.offer(_NO_KEYFRAME)
 
     def reset(self) -> None:
-        """Drop waiting keyframes and what the last ones proposed."""
+        """Drop waiting keyframes and the proposals of the last ones."""
         self.worker.reset()
         self._waiting.drop()
         self._consistency.clear()
@@ -144,7 +143,7 @@ class LoopClosing:
         self.last_keyframe = -1
 
     def process(self, keyframe: int) -> None:
-        """Everything that is done with one keyframe."""
+        """Do all work for one keyframe."""
         timer = StageTimer()
         if keyframe == _NO_KEYFRAME:
             self._close_last(timer)
@@ -173,7 +172,7 @@ class LoopClosing:
 
     @contextlib.contextmanager
     def _lease(self, keyframe: int) -> Iterator[bool]:
-        """Keep a keyframe alive; yields False when it is dead already."""
+        """Protect a keyframe from culling; yield False if it is already culled."""
         try:
             self._map.begin_lease(keyframe)
         except StateError:
@@ -219,9 +218,9 @@ class LoopClosing:
         return self._map.map_of(loop.current) != self._map.map_of(loop.matched)
 
     def _verify(self, keyframe: int, proposals: _Proposals) -> core.Loop | None:
-        """Choose the loop that geometry confirms, unless another place fits as well.
+        """Choose the verified loop, unless another place fits as well.
 
-        It leads to another map only when none does within this one.
+        It leads to another map only if there is none in this map.
         """
 
         def confirmed(candidates: list[int]) -> list[core.Loop]:
@@ -257,7 +256,7 @@ class LoopClosing:
             self._seam = merged.map_index, self._next_search
 
     def _adjust_seam(self, keyframe: int) -> None:
-        """Adjust a joined map again when the camera has seen more of what its parts share."""
+        """Adjust a merged map again when both parts share more observations."""
         if self._seam is None or keyframe < self._seam[1]:
             return
         (map_index, _), self._seam = self._seam, None

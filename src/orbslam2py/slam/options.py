@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a system is asked for, beside its camera."""
+"""Options of a system, beside its camera."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ class SystemOptions:
     ------
     SettingsError
         If a switch is not True or False, the effort is not a name of `Effort`, the seed is no whole
-        number from 0 to 2^64 - 1, the time limit is not more than 0 or given for the deterministic
-        mode, `new_map_after` is not a number of seconds, or either is of something that is off.
+        number from 0 to 2^64 - 1, the time limit is not above 0 or is used with the deterministic
+        mode, `new_map_after` is no number of seconds, or an option belongs to a feature that is
+        off.
     """
 
     deterministic: bool = False
@@ -72,7 +73,7 @@ class SystemOptions:
 
     @property
     def full_config(self) -> Config:
-        """The whole configuration: the preset of the effort, and what was changed of it."""
+        """Return the whole configuration: the preset of the effort, with the changes."""
         return Config().with_changes({**PRESETS[str(self.effort)], **self.config})
 
     def _check_time_limit(self) -> None:
@@ -92,7 +93,7 @@ class SystemOptions:
 
 
 def _changes_of(given: Any) -> dict[str, float | int | bool]:
-    """Take changes of the configuration, by names with a dot, or a whole one."""
+    """Return a configuration from changes (names with a dot) or from a whole one."""
     if isinstance(given, Config):
         return given.changes()
     if not isinstance(given, Mapping):
@@ -105,7 +106,7 @@ def _changes_of(given: Any) -> dict[str, float | int | bool]:
 
 @dataclass(frozen=True)
 class Setup:
-    """What a system is made of: given, or taken from the map that it loads."""
+    """The parts of a system: given, or from the map that it loads."""
 
     sensor: Sensor
     settings: Settings
@@ -128,7 +129,7 @@ class Setup:
         allow_other: bool,
         imu: ImuSettings | str | Path | None = None,
     ) -> Setup:
-        """Put together what was given and what the map brings; `System` describes the arguments."""
+        """Combine the arguments with the contents of the map; `System` describes the arguments."""
         if map_to_load is None or isinstance(map_to_load, (SavedMap, MapFile)):
             loaded = map_to_load
         else:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether the two images of the first stereo pairs are two.
+"""Check that the two images of the first stereo pairs differ.
 
-One image given twice looks like a world infinitely far away: a map comes of it, of nonsense.
+One image given twice looks infinitely far away, and the map would be wrong.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _TEXT = (
 
 
 class PairCheck:
-    """Warns once if a pair is one image twice.
+    """Warns once if both images of a pair are the same.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class PairCheck:
 
     @property
     def done(self) -> bool:
-        """Whether nothing further needs to be looked at."""
+        """Whether the check is finished."""
         return self._left == 0 or self._chances == 0
 
     def look(self, left: ByteArray, right: ByteArray) -> None:
-        """Judge a pair of equal shape; one without any picture does not count."""
+        """Check a pair of equal shape; a pair without texture does not count."""
         if self.done:
             return
         self._chances -= 1

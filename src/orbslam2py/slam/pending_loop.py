@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A loop that few matches hold waits for a better one; ``docs/method/loops.md#waiting``."""
+"""A loop with few matches waits for a better one; ``docs/method/loops.md#waiting``."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _PATIENCE = 8  # keyframes that a loop with few matches waits for a better one
 
 
 class PendingLoop:
-    """Chooses among the loops of a few keyframes the one with most matches.
+    """Chooses the loop with most matches among those of a few keyframes.
 
-    A place is first recognised from afar, where its points lie close together in the image and a
-    few wrong matches turn the similarity by degrees. The keyframes that follow see more of it.
+    From a distance, the points of a place lie close together in the image, and a few wrong matches
+    rotate the similarity by degrees. The keyframes that follow see more of it.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class PendingLoop:
 
     @contextlib.contextmanager
     def ripe(self, found: core.Loop | None) -> Iterator[core.Loop | None]:
-        """Yield the loop that is to be closed now, if there is one; asked once for a keyframe.
+        """Yield the loop to close now, if there is one; called once for a keyframe.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class PendingLoop:
 
     @contextlib.contextmanager
     def last(self) -> Iterator[core.Loop | None]:
-        """Yield what waits, if anything does: no keyframe follows."""
+        """Yield the pending loop, if there is one: no keyframe follows."""
         self._follow_map()
         try:
             yield self._best
@@ -104,7 +104,7 @@ class PendingLoop:
         return best.n_matches >= self._limits.firm_matches or self._n_waited >= _PATIENCE
 
     def _follow_map(self) -> None:
-        """Find what waits anew if the map has moved since; drop it if it is no loop any more."""
+        """Verify the pending loop again if the map has moved; drop it if it fails."""
         best = self._best
         if best is None:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What one image does, top to bottom: the block diagram of the method.
+"""The steps for one image, in their order: the block diagram of the method.
 
 Mur-Artal and Tardos, "ORB-SLAM2", 2017, figure 2; ``docs/method/index.md``.
 """
@@ -63,18 +63,18 @@ BuildFrame = Callable[[int, StageTimer], core.Frame]
 
 
 class Pipeline:
-    """All parts of the method, and the way of an image through them.
+    """All parts of the method, and the steps for each image.
 
-    One thread at a time delivers images; everything else may be looked at from any thread.
+    One thread at a time delivers images; all other parts can be read from any thread.
 
     Parameters
     ----------
     setup : Setup
-        Camera and visual words, and the map to begin in: tracking is lost then and searches it.
+        Camera, visual words and the initial map; with a map, tracking starts lost and searches it.
     options : SystemOptions
         How to work.
     callbacks : Callbacks
-        Who wants to know what happens.
+        Receives events.
 
     Attributes
     ----------
@@ -89,9 +89,9 @@ class Pipeline:
     keeper : MapAutosave
         The map in files.
     reset_requested : threading.Event
-        When set, the next image begins a new map, and all before it is forgotten.
+        If set, the next image begins a new map, and the old one is dropped.
     frame_watchers : tuple of callables
-        Told of every image; assign another tuple to add one. They must be quick and not raise.
+        Called for every image; assign another tuple to add one. They must be quick and not raise.
     """
 
     def __init__(self, setup: Setup, options: SystemOptions, callbacks: Callbacks) -> None:
@@ -152,7 +152,7 @@ class Pipeline:
         )
 
     def start(self) -> None:
-        """Start the workers' threads, now that everything refers to everything it needs."""
+        """Start the threads of the workers, after all parts are connected."""
         for worker in self.back_end.workers:
             worker.start()
 
@@ -192,9 +192,9 @@ class Pipeline:
         build : callable
             Makes the frame: ``build(frame_id, timer)``.
         image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-            What is shown of it to those who watch.
+            The data of the frame that viewers get.
         details : bool
-            The record is to hold keypoints and matches.
+            The record contains keypoints and matches.
         """
         self._make_ready(timestamp)
         tracking = self.tracking
@@ -281,7 +281,7 @@ class Pipeline:
         worker.wait_until_idle(unless_held=True)
 
     def _look_again_at_start(self) -> None:
-        """Once a single camera's map has settled, its first frames get better poses in it."""
+        """Estimate the first frames of a single camera's map again, once this map has settled."""
         n_young = self.recorder.n_young
         slam_map = self.back_end.map
         settled = slam_map.n_keyframes_of(slam_map.active_map) > _SETTLED_MAP
@@ -356,7 +356,7 @@ class Pipeline:
             events.post(Relocalized(*here, record.T_wc))
 
     def request_reset(self) -> None:
-        """Begin a new map with the next image, and forget all before it."""
+        """Begin a new map with the next image, and drop the old one."""
         self.reset_requested.set()
 
     # ---- a new map -------------------------------------------------------------------------------
@@ -389,7 +389,7 @@ class Pipeline:
         self._last_timestamp = -math.inf
 
     def _give_up(self, map_index: int) -> bool:
-        """End a map; False if it has become part of another one meanwhile."""
+        """End a map; return False if it has been merged meanwhile."""
         slam_map = self.back_end.map
         if len(slam_map.maps) > 1 or slam_map.active_map != map_index:
             keep = self.recorder.end_map

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tracking says about each image."""
+"""The result of tracking an image."""
 
 from __future__ import annotations
 
@@ -52,14 +52,15 @@ class Reason(str, enum.Enum):
 
 
 class Verdict(str, enum.Enum):
-    """Whether a pose is believed, by its evidence."""
+    """Whether a pose is accepted, by its evidence."""
 
     STRONG = "strong"
-    """As much of what should be seen was found as in the frames before."""
+    """Accepted: as many expected points were found as in the frames before."""
     WEAK = "weak"
-    """Believed, but much less was found: such a frame brings nothing into the map."""
+    """Accepted, but uncertain: much fewer points were found, and the frame does not extend the
+    map."""
     REFUSED = "refused"
-    """Not believed: the frame is lost."""
+    """Rejected: the frame is lost."""
 
     def __str__(self) -> str:
         return self.value
@@ -85,49 +86,48 @@ class PoseMethod(str, enum.Enum):
 
 @dataclass(frozen=True)
 class Evidence:
-    """What speaks for a pose.
+    """The numbers by which a pose is validated.
 
-    "Usual" is a running mean over the frames before whose evidence was strong; ratios to it are 1
-    where there were none.
+    "Usual" is the running mean over earlier frames with strong evidence; without such frames,
+    ratios to it are 1.
     """
 
     verdict: Verdict
     method: PoseMethod
     """What found the pose."""
     doubted: bool
-    """The evidence of the pose that was found first fell so suddenly that it was searched by other
-    ways as well."""
+    """The evidence of the first pose fell so suddenly that other methods searched the pose too."""
     confirmed: bool
-    """Then a second method, which does not begin where this one did, came to the same pose."""
+    """A second method with another starting point found the same pose."""
     n_predicted: int
-    """Map points that should be in view; in visual odometry, points that the frame before saw."""
+    """Map points that should be in view; in visual odometry, points of the frame before."""
     found: float
-    """Share of these that were found and accepted, 0 to 1."""
+    """Visibility ratio: share of these points that are inliers, 0 to 1."""
     found_to_usual: float
-    """That share by the usual one."""
+    """Visibility ratio over its usual value."""
     inliers_to_usual: float
-    """Inliers by their usual number."""
+    """Inliers over their usual number."""
     n_cells: int
-    """Cells of the image, of 8 x 6, that hold an inlier."""
+    """Cells of the image, 8 x 6, with at least one inlier."""
     n_octaves: int
-    """Octaves of depth (1 to 2, 2 to 4, 4 to 8... of the map's units) that hold an inlier."""
+    """Octaves of depth (1 to 2, 2 to 4, 4 to 8... of the map's units) with at least one inlier."""
     deviation_to_usual: float
-    """Standard deviation of the position by the usual one."""
+    """Standard deviation of the position over its usual value."""
     match_error: float
-    """Median reprojection error of all that was matched, outliers too, in standard deviations of
-    the keypoints' positions."""
+    """Median reprojection error of all matches, with outliers, in standard deviations of the
+    keypoints' positions."""
     error_to_usual: float
-    """That error by the usual one."""
+    """Median error over its usual value."""
     turn_change: float
-    """Degrees by which the camera turned otherwise than from the frame before the last to the
-    last; 0 where the motion is not known."""
+    """Rotation that differs from the motion between the two frames before, degrees; 0 if that is
+    not known."""
     move_change: float
-    """The same for its way, metres (one camera: the map's units)."""
+    """Translation that differs from it, metres (one camera: the map's units)."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameFeatures(EqualByValue):
-    """The keypoints of a frame and what they were matched to (on request)."""
+    """The keypoints of a frame and their matches (on request)."""
 
     keypoints: npt.NDArray[np.float32]
     """(n, 2) undistorted pixel coordinates."""
@@ -136,9 +136,11 @@ class FrameFeatures(EqualByValue):
     depths: npt.NDArray[np.float32]
     """(n,) metres, -1 where unknown."""
     map_point_ids: npt.NDArray[np.int64]
-    """(n,) id of the matched map point, -1 for none; in a keyframe also of points made from it."""
+    """(n,) id of the matched map point, -1 for none; a keyframe also has ids of points that it
+    created."""
     inliers: npt.NDArray[np.bool_]
-    """(n,) matched and accepted by the pose optimisation: as many as `TrackingRecord.n_inliers`."""
+    """(n,) whether the match is an inlier of the pose optimisation; `TrackingRecord.n_inliers` of
+    them."""
     colours: npt.NDArray[np.uint8]
     """(n, 3) red, green, blue of the image at the keypoints; (0, 3) for a grey image."""
 
@@ -164,17 +166,17 @@ class InertialState(EqualByValue):
 
 @dataclass(frozen=True, eq=False)
 class TrackingRecord(EqualByValue):
-    """Result of one track call; two are equal if all fields are, arrays number by number."""
+    """Result of one track call; two are equal if all fields and arrays are equal."""
 
     frame_id: int
-    """Number of the image since the last reset, from 0. When a single camera's young map comes to
-    nothing, the count goes on: its images serve the next map."""
+    """Number of the image since the last reset, from 0. If a single camera's young map is dropped,
+    the count continues, because the next map uses its images."""
     timestamp: float
     """Seconds, as given by the caller."""
     map_index: int
-    """The map that the pose is in: 0 for the first one; every map that begins has the next number,
-    also after a reset and after a start of a single camera that failed. Without a pose: the map in
-    which tracking was lost."""
+    """Number of the map of the pose, 0 for the first one. Every new map gets the next number, also
+    after a reset and after a failed start of a single camera. Without a pose: the map in which
+    tracking was lost."""
     state: TrackingState
     reason: Reason
     """Why there is no pose (`Reason.NONE` if there is one)."""
@@ -186,16 +188,16 @@ class TrackingRecord(EqualByValue):
     n_matches: int
     """Keypoints matched to map points before the last pose optimisation."""
     n_inliers: int
-    """Of these, accepted by it."""
+    """Inliers: those that it accepted."""
     is_keyframe: bool
     reference_keyframe: int
     """Keyframe that shares most points with the frame, -1 for none."""
     visual_odometry: bool = False
-    """In localization mode: outside the map, the pose hangs on the depths of the frame before."""
+    """In localization mode: outside the map, the pose depends on the depths of the frame before."""
     unconfirmed: bool = False
-    """Found again in this image: the next one has to confirm it before the map grows."""
+    """Relocalized in this image: the next one must confirm it before the map grows."""
     milliseconds: dict[str, float] = field(default_factory=dict)
-    """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (all of it)."""
+    """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (total)."""
     features: FrameFeatures | None = None
     evidence: Evidence | None = None
     """What speaks for the pose, or, if the reason is `Reason.WEAK_EVIDENCE`, spoke against it; None
@@ -224,7 +226,7 @@ class MapSummary:
     map_index: int
     """As in `TrackingRecord.map_index`: older maps have lower numbers."""
     active: bool
-    """New keyframes belong to it; the others rest."""
+    """New keyframes are added to it; the others are inactive."""
     n_keyframes: int
     n_map_points: int
 
@@ -236,10 +238,10 @@ def _nothing() -> IntArray:
 
 @dataclass(frozen=True, eq=False)
 class PoseEstimate:
-    """What one step of tracking found out about a frame's pose.
+    """Result of one step of tracking: an estimate of a frame's pose.
 
-    If it was found, the frame holds pose and associations. A step that fails leaves them
-    undefined: the next one begins anew.
+    If it was found, the frame holds pose and associations. A failed step leaves them undefined: the
+    next step replaces them.
     """
 
     reason: Reason = Reason.NONE
@@ -251,13 +253,13 @@ class PoseEstimate:
     covariance: FloatArray | None = None
     """(6, 6), see `TrackingRecord.covariance`."""
     discarded: IntArray = field(default_factory=_nothing)
-    """Ids of the points that were matched and thrown out as outliers, ascending."""
+    """Ids of the points that were matched and rejected as outliers, ascending."""
     visual_odometry: bool = False
-    """The pose hangs on the depths of the frame before more than on the map."""
+    """The pose depends more on the depths of the frame before than on the map."""
     left_map: bool = False
-    """The frame before was in the map, and this one is not."""
+    """The frame before was in the map, but this one is not."""
     relocalized: bool = False
-    """Found without a guess from the frame before."""
+    """Found without a prediction from the frame before."""
     method: PoseMethod = PoseMethod.MOTION_MODEL
     """What found it."""
     evidence: Evidence | None = None
@@ -265,7 +267,7 @@ class PoseEstimate:
     by_image: core.Pose | None = None
     """``T_cw`` by the image alone, where the pose is that of image and IMU together."""
     unconfirmed: bool = False
-    """Found again, and not yet confirmed by the next frame."""
+    """Relocalized, and not yet confirmed by the next frame."""
 
     @property
     def found(self) -> bool:
@@ -273,21 +275,21 @@ class PoseEstimate:
         return self.reason is Reason.NONE
 
     def failed(self, reason: Reason) -> PoseEstimate:
-        """The same, but not believed."""
+        """Return the same estimate, with its pose rejected."""
         return replace(self, reason=reason)
 
 
 @dataclass(frozen=True, eq=False)
 class TrackingResult:
-    """What tracking one frame gave."""
+    """Result of tracking one frame."""
 
     state: TrackingState
     estimate: PoseEstimate
     is_keyframe: bool = False
     given_up: int | None = None
-    """Number of a map that was lost so soon, or is so wrong, that it is better to begin another."""
+    """Number of a map that should be dropped, because it was lost too early or is wrong."""
     earlier: tuple[core.TrackedFrame, ...] = ()
-    """Frames before this one that have found their poses now that there is a map, in order."""
+    """Earlier frames that have poses now, because the map has begun; in order."""
     inliers: npt.NDArray[np.bool_] | None = None
     """(n,) keypoints that the pose was accepted with; None unless details were asked for."""
     begins_map: bool = False

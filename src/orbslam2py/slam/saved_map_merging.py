@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps of different runs, days and places made one map, as far as they show the same places."""
+"""Merging of saved maps of different runs and days that show the same places."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ def merge_maps(
     full_adjustment: bool = True,
     seed: int = 0,
 ) -> tuple[SavedMap, list[MapsMerged]]:
-    """Make one map of several, as the system does with maps that meet while it runs.
+    """Merge several maps, as a running system merges its maps.
 
-    Every keyframe of the second map and of all after it is compared with all maps; loops are
-    closed as well. What shows no common place stays a map of its own beside the others. The world
-    and the scale of the older map, which is the one that is named first, stay.
+    Every keyframe of the second and later maps is compared with all maps; loops are closed too. A
+    map without a common place remains a separate map. A merged map keeps the world and the scale of
+    the map that is named first.
 
     Parameters
     ----------
     files
-        Maps, as from `load_map`; each may hold several already. At least two.
+        Maps, as from `load_map`; each may contain several. At least two.
     vocabulary
-        Visual words that they were made with; those shipped with the package if None.
+        Visual words of the maps; None: the vocabulary of the package.
     full_adjustment
-        Refine maps that have become one as a whole.
+        Whether to run full bundle adjustment on merged maps.
     seed
         Of all random draws.
 
@@ -51,12 +51,12 @@ def merge_maps(
     merged
         All maps, with the runs and images of all.
     merges
-        Which became part of which.
+        Which maps were merged into which.
 
     Raises
     ------
     MapFileError, SettingsError
-        If they are of different cameras, sensors or visual words, or fewer than two.
+        If they have different cameras, sensors or vocabularies, or if there are fewer than two.
     """
     if not isinstance(files, Sequence) or len(files) < 2:
         raise MapFileError("merging takes two maps or more, a list of what load_map returns")
@@ -97,7 +97,7 @@ def merge_maps(
 
 
 def _compare(slam_map: core.Map, index: core.KeyFrameIndex, closing: LoopClosing) -> None:
-    """Let every keyframe look for its place in the maps before its own."""
+    """Search a place for every keyframe in the maps before its own."""
     for number in slam_map.maps:
         for keyframe in slam_map.keyframe_ids(number).tolist():
             if number == 0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The system as a user sees it: images in, poses and a map out."""
+"""The interface for users: images in, poses and a map out."""
 
 from __future__ import annotations
 
@@ -63,73 +63,73 @@ class System:
     Parameters
     ----------
     settings : Settings or str or path
-        Calibration and extractor settings: an object, the name of a built-in (``"tum1"``,
-        ``"kitti04-12"``, ``"euroc"``...), or a file in the ORB-SLAM YAML format. May be left out
-        with `load_map`: a map file holds its own.
+        Calibration and extractor settings: an object, the name of built-in settings (``"tum1"``,
+        ``"kitti04-12"``, ``"euroc"``...), or a YAML file of ORB-SLAM. Not needed with `load_map`: a
+        map file contains its own.
     sensor : Sensor or str
-        ``"mono"``, ``"stereo"`` or ``"rgbd"``. May be left out with `load_map`.
+        ``"mono"``, ``"stereo"`` or ``"rgbd"``. Not needed with `load_map`.
     vocabulary : Vocabulary or path, optional
-        Visual words; the one shipped with the package if None.
+        Visual words; None: the vocabulary of the package.
     load_map : SavedMap, MapFile or path, optional
-        Begin in a map that was saved before: lost at first, every image is searched in it. It is
-        never given up for a new one, unless you `reset`; another one may begin beside it.
+        Map file to begin in: tracking starts lost, and every image is searched in this map. It is
+        dropped only by `reset`; another map may begin beside it.
     initial_pose : array (4, 4), optional
-        Camera to world: where in the loaded map the camera may be; tried before all else until the
-        first image is found.
+        Camera to world: likely pose of the camera in the loaded map; it is tried first until an
+        image is found.
     allow_other_setup : bool
-        Load the map although it was made with another camera or other visual words.
+        Load the map even if it was made with another camera or vocabulary.
     deterministic : bool
         Run mapping and loop closing inline after each keyframe: two runs give the same bytes.
     wait_for_mapping : bool
-        For recorded data: a track call waits until at most one keyframe waits for mapping, and
-        until mapping is idle if the image may become a keyframe in its turn (with a single camera
-        every one may), so that mapping keeps up however fast the images are delivered. With a
-        stereo or RGB-D sensor the result still depends a little on the timing of the threads;
-        `deterministic` does not. For live cameras leave it off.
+        For recorded data: a track call waits until at most one keyframe waits for mapping. If the
+        image may become a keyframe as soon as mapping is idle (with a single camera always), it
+        waits until mapping is idle. So mapping keeps up at any speed of the images. With a stereo
+        or RGB-D sensor the result still depends slightly on the timing of the threads; with
+        `deterministic` it does not. Do not use it with live cameras.
     loop_closing : bool
-        Recognise places seen before and take out the drift.
+        Close loops: recognise known places and correct the drift.
     full_adjustment : bool
-        After every loop, refine the whole map in a thread of its own.
+        Run full bundle adjustment after every loop, in a separate thread.
     full_adjustment_time_limit : float, optional
-        Seconds after which a full adjustment ends with what it has reached. Not in deterministic
-        mode, whose results must not depend on the clock.
+        Time limit of a full bundle adjustment in seconds; the result up to then is used. Not
+        allowed in deterministic mode, whose results must not depend on the clock.
     callbacks : Callbacks, optional
-        Functions that are told of loops, keyframes, losses and changes of the map.
+        Functions that receive loops, keyframes, losses and changes of the map.
     keyframe_images : bool
-        Keep a small grey JPEG of every keyframe for map files.
+        Store a small grey JPEG of every keyframe in map files.
     seed : int
-        Seed of all random draws.
+        Seed of all random numbers.
     several_maps : bool
-        Begin another map when tracking is lost for long; the old one rests and is searched on.
-        Otherwise nothing is mapped until the camera sees the old map again.
+        Begin another map if tracking is lost for long; the old one becomes inactive, but is still
+        searched. Otherwise mapping stops until the camera sees the old map again.
     new_map_after : float
-        Seconds of time stamps that tracking is lost before another map begins.
+        Time between the loss and the start of another map, in seconds of the time stamps.
     effort : {"fast", "normal", "thorough"}
-        How much work goes into map and path: ``fast`` makes fewer keyframes, ``thorough`` matches
-        every frame with the map once more when that has settled, the last thousand in `shutdown`.
+        Amount of work for map and trajectory: ``fast`` makes fewer keyframes; ``thorough`` matches
+        every frame with the map again after the map has settled, the last thousand in `shutdown`.
     config : Config or mapping, optional
-        Changes of single thresholds, by names with a dot: ``{"tracking.map_matches": 12}``; see
+        Changes of thresholds, by names with a dot: ``{"tracking.map_matches": 12}``; see
         `orbslam2py.slam.config`.
     imu : ImuSettings, str or path, optional
         The IMU beside the (left, unrectified) camera, or a file that `read_imu_settings` reads; by
         default what the settings file says of it (``IMU.*`` keys). Needed for `track` with samples
         and for `add_imu`.
     check_calibration : bool
-        Log one warning if the calibration cannot belong to images of the first one's size.
-        `orbslam2py.check_calibration` looks into the images, too.
+        Log one warning if the calibration contradicts the size of the first image.
+        `orbslam2py.check_calibration` also examines the images.
 
     Attributes
     ----------
     settings, sensor, vocabulary, options
-        What the system was made with.
+        The options of the system.
     pipeline : Pipeline
-        The parts that do the work, for those who study or extend the method. They may change from
+        The parts of the system, for users who study or extend the method. They may change from
         version to version.
 
     Raises
     ------
     SettingsError, VocabularyError, MapFileError
-        If these cannot be read or are inconsistent, or the loaded map is one of another camera,
+        If the settings cannot be read or are inconsistent, or the loaded map has another camera,
         sensor or vocabulary; no thread is left running.
 
     Examples
@@ -207,15 +207,15 @@ class System:
         ----------
         images : array, sequence of two arrays, or images
             One camera: the image. Stereo: left and right, rectified and synchronised. RGB-D: image
-            and registered depth. Or what a sequence loads, `orbslam2py.datasets.Images`.
+            and registered depth. Or `orbslam2py.datasets.Images` of a sequence.
 
             Images are uint8 (h, w), (h, w, 3) or (h, w, 4), grey or colour (order by ``Camera.RGB``
-            of the settings). Depth is (h, w) of any kind of number: divided by ``DepthMapFactor``
-            it is metres. 0, negative, NaN, or hidden in a masked array: unknown.
+            of the settings). Depth is (h, w) of any number type; divided by ``DepthMapFactor`` it
+            is in metres. Zero, negative, NaN and masked values are unknown.
         timestamp : float
-            Seconds; must grow from call to call.
+            Seconds; must increase from call to call.
         mask : array of uint8 (h, w), or two of them (left, right), optional
-            No keypoint lies where it is 0; one array serves both images of a pair.
+            No keypoints are taken where the mask is 0; one array serves both images of a pair.
         details : bool
             Also return the frame's keypoints and matches.
         imu : array of float64 (n, 7), optional
@@ -227,9 +227,9 @@ class System:
         Returns
         -------
         TrackingRecord
-            State and, if it is OK, the pose of the left or only camera. With one camera the unit of
-            length is the median depth of the first view; until the map begins,
-            `TrackingRecord.reason` tells what it waits for.
+            State and, if it is OK, the pose of the left or single camera. With one camera the unit
+            of length is the median depth of the first view. Before the map begins,
+            `TrackingRecord.reason` says what is missing.
 
         Raises
         ------
@@ -242,7 +242,7 @@ class System:
         DatasetError
             If the samples of the IMU have another shape; nothing has changed then.
         WorkerError
-            If a worker has failed; the original exception is its cause.
+            If a worker has failed; its exception is the cause.
         """
         if imu is not None:
             self.pipeline.inertial.add(imu)
@@ -307,7 +307,7 @@ class System:
         Raises
         ------
         StateError
-            For another sensor as well.
+            Also if the system has another sensor.
         """
         self._require(Sensor.STEREO, "track_stereo")
         return self.track((left, right), timestamp, mask=mask, details=details)
@@ -326,7 +326,7 @@ class System:
         Raises
         ------
         StateError
-            For another sensor as well.
+            Also if the system has another sensor.
         """
         self._require(Sensor.RGBD, "track_rgbd")
         return self.track((image, depth), timestamp, mask=mask, details=details)
@@ -344,17 +344,17 @@ class System:
         Raises
         ------
         StateError
-            For another sensor as well.
+            Also if the system has another sensor.
         """
         self._require(Sensor.MONOCULAR, "track_monocular")
         return self.track(image, timestamp, mask=mask, details=details)
 
     def run(self, source: FrameSource, *, details: bool = False) -> list[TrackingRecord]:
-        """Track all images of a sequence, and wait until their keyframes have been processed.
+        """Track all images of a sequence, and wait until their keyframes are processed.
 
-        For recorded images make the system with `wait_for_mapping` or `deterministic`, else mapping
-        does not keep up. `orbslam2py.run_sequence` does more: it reads ahead, skips images that
-        cannot be read, compares with ground truth and writes files.
+        For recorded images create the system with `wait_for_mapping` or `deterministic`; otherwise
+        mapping does not keep up. `orbslam2py.run_sequence` does more: it reads ahead, skips
+        unreadable images, compares with ground truth and writes files.
 
         Parameters
         ----------
@@ -396,13 +396,13 @@ class System:
     # ---- control ---------------------------------------------------------------------------------
     @property
     def localization_mode(self) -> bool:
-        """Pose only, in the map as it is: no keyframes, no new points, mapping paused.
+        """Estimate poses in a fixed map: no keyframes, no new points, mapping paused.
 
-        Assign to switch; carried out at the beginning of the next track call, and the last
-        assignment before it counts. Leaving the map, the camera is followed by the depths of the
-        frame before (stereo, RGB-D) until a mapped place comes into view again. Keyframes that wait
-        for mapping are processed when it goes on. Without a map, also after a reset, the mode comes
-        into force when one has begun. What is neither True nor False is a `SettingsError`.
+        Assign to switch the mode. The switch happens at the beginning of the next track call; the
+        last assignment before it counts. Outside the map, the pose follows the depths of the frame
+        before (stereo, RGB-D) until a mapped place is in view again. Keyframes that wait for
+        mapping are processed when mapping continues. Without a map, also after a reset, the mode
+        begins as soon as there is a map. A value other than True or False raises `SettingsError`.
         """
         return self.pipeline.localization.wanted
 
@@ -411,29 +411,28 @@ class System:
         self.pipeline.localization.wanted = choice_of(wanted, "localization_mode")
 
     def reset(self) -> None:
-        """Ask for a new map; carried out at the beginning of the next track call.
+        """Request a new map; it begins with the next track call.
 
-        Settings, vocabulary and mode stay; the images may have another size from then on. The
-        trajectory of the present map is kept, see `trajectories`.
+        Settings, vocabulary and mode are kept; the next images may have another size. The
+        trajectory of the present map is kept: see `trajectories`.
         """
         self.pipeline.request_reset()
 
     def optimize(
         self, *, stop: threading.Event | None = None, map_index: int | None = None
     ) -> FullAdjustmentRecord:
-        """Refine all keyframes and points of a map together, now (full bundle adjustment).
+        """Run full bundle adjustment of a map now: all keyframes and points together.
 
-        Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was; so do a loop
-        that is closed meanwhile, another call, a reset, the shutdown and a switch to localization
-        mode.
+        Tracking may continue meanwhile. Ctrl-C stops it and leaves the map as it was. A loop
+        closure, another call, a reset, the shutdown and a switch to localization mode stop it too.
 
         Parameters
         ----------
         stop : threading.Event, optional
-            Gives up when it is set, as a Ctrl-C does. In the deterministic mode nothing does once
-            it has begun.
+            An event that stops it when set, like Ctrl-C. In deterministic mode, nothing stops it
+            after its start.
         map_index : int, optional
-            One of `maps`; the active one if None.
+            Number of one of `maps`; None: the active one.
 
         Returns
         -------
@@ -443,9 +442,10 @@ class System:
         Raises
         ------
         StateError
-            In localization mode, where the map is not to change, or if an argument is none.
+            In localization mode, where the map must not change, or if an argument is invalid.
         IndexError
-            If no map of that number has begun. Of one that is no more nothing is refined.
+            If no map of that number has begun. A map that has been merged or dropped is not
+            adjusted.
         WorkerError
             If a worker has failed.
         """
@@ -461,21 +461,21 @@ class System:
         return adjustment.start_and_wait(stop, map_index)
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
-        """Wait until every keyframe has been processed, and full adjustments have ended.
+        """Wait until every keyframe is processed and full bundle adjustments have ended.
 
-        A loop that waits for a better view is closed first, but not in localization mode.
+        A pending loop is closed first, but not in localization mode.
 
         Returns
         -------
         bool
-            False when `timeout` seconds passed first, or keyframes wait for the end of localization
-            mode.
+            False if `timeout` seconds are over first, or if keyframes wait for the end of
+            localization mode.
 
         Raises
         ------
         StateError
-            In a callback of the deterministic mode, which the image waits for; False if a time is
-            given.
+            In a callback of deterministic mode, because the image waits for the callback; False if
+            a time is given.
         """
         localization = self.pipeline.localization
         return self.pipeline.back_end.wait_until_idle(
@@ -489,25 +489,25 @@ class System:
         wait_for_adjustment: bool = False,
         timeout: float | None = None,
     ) -> None:
-        """Stop the workers and join their threads; idempotent.
+        """Stop the workers and join their threads; further calls do nothing.
 
-        To be repeated after a time-out or a Ctrl-C. Results remain available. Also called at the
-        end of a ``with`` block. Of several errors the first is raised, and the others are logged.
+        Call it again after a time-out or Ctrl-C. Results remain available. Also called at the end
+        of a ``with`` block. Of several errors, the first is raised and the others are logged.
 
         Parameters
         ----------
         drain : bool
-            Let waiting keyframes be processed first.
+            Process waiting keyframes first.
         wait_for_adjustment : bool
-            Let a running full adjustment end as well; otherwise it is given up, and the map stays
-            as it was before it.
+            Wait for a running full bundle adjustment too; otherwise it is stopped, and the map
+            stays as it was before.
         timeout : float, optional
             Seconds to wait for each worker, and for a track call in another thread.
 
         Raises
         ------
         WorkerError
-            If a worker has failed, or does not end in time.
+            If a worker has failed or does not end in time.
         MapFileError
             If the last autosave could not be written.
         """
@@ -543,33 +543,34 @@ class System:
 
     # ---- map files -------------------------------------------------------------------------------
     def save_map(self, path: str | Path) -> None:
-        """Save the map as it is at this moment; from any thread, also while images are tracked.
+        """Save the present map; from any thread, also during tracking.
 
         Parameters
         ----------
         path : str or path
-            The file, by custom with the suffix ``.orbmap``. It appears under its name when all of
-            it has been written. That of `autosave` is brought up to date, which after a `reset` is
-            ``<name>-1.orbmap``: the map before stays.
+            The file, by custom with the suffix ``.orbmap``. It gets this name only after it is
+            complete. If it is the file of `autosave`, this file is updated; after a `reset` its
+            name is ``<name>-1.orbmap``, and the file of the map before is kept.
 
         Raises
         ------
         MapFileError
-            If the map has no keyframes yet, or the file cannot be written; a file that was there is
+            If the map has no keyframes yet, or the file cannot be written; an existing file is
             kept.
         """
         self.pipeline.keeper.save(path)
 
     def autosave(self, path: str | Path, every: float = 10.0) -> None:
-        """Keep a map file up to date from now on: only what has changed is written.
+        """Update a map file regularly from now on; only changes are written.
 
-        Whatever ends the program, the file opens and is the map of the last time. `shutdown` saves
-        once more. After a `reset` the new map is saved beside it, as ``<name>-1.orbmap``.
+        However the program ends, the file is valid and contains the map of the last save.
+        `shutdown` saves once more. After a `reset` the new map is saved beside it, as
+        ``<name>-1.orbmap``.
 
         Parameters
         ----------
         path : str or path
-            The file; replaced by the first save, which follows after `every` seconds.
+            The file; the first save, after `every` seconds, replaces it.
         every : float
             Seconds from one save to the next.
 
@@ -588,11 +589,11 @@ class System:
         self.pipeline.keeper.autosave(target, seconds)
 
     def saved_map(self) -> SavedMap:
-        """Everything that `save_map` would write at this moment."""
+        """Return all that `save_map` would write now."""
         return self.pipeline.keeper.saved_map()
 
     def map_contents(self) -> MapContents:
-        """Everything that the map is, as arrays; may be called while the system runs."""
+        """Return all data of the map as arrays; may be called while the system runs."""
         return take_contents(self.pipeline.back_end.map)
 
     @property
@@ -645,29 +646,29 @@ class System:
 
     @property
     def merges(self) -> list[MapsMerged]:
-        """The maps that have become part of older ones so far."""
+        """The maps that have been merged into older ones so far."""
         return list(self.pipeline.back_end.loop_closing.merges)
 
     @property
     def full_adjustments(self) -> list[FullAdjustmentRecord]:
-        """The full bundle adjustments so far, also those that were given up."""
+        """The full bundle adjustments so far, also those that were stopped."""
         return list(self.pipeline.back_end.adjustment.records)
 
     @property
     def n_resets(self) -> int:
-        """How often a map was given up for a new one; not a single camera's failed starts."""
+        """Number of maps that were dropped for a new one, without failed starts."""
         return self.pipeline.n_resets
 
     @property
     def n_relocalizations(self) -> int:
-        """How often tracking was found again after a loss."""
+        """Number of relocalizations after a loss."""
         return self.pipeline.tracking.n_relocalizations
 
     def trajectory(self) -> Trajectory:
         """Poses of all images of the active map, after the latest optimisation.
 
-        After `shutdown` those of the last thousand images have been estimated once more, from the
-        points that they saw where these lie in the end.
+        `shutdown` estimates the poses of the last thousand images again, from their points in the
+        final map.
 
         Returns
         -------
@@ -678,10 +679,9 @@ class System:
         return self.pipeline.recorder.trajectory()
 
     def trajectories(self) -> list[Trajectory]:
-        """One trajectory per map, by its number: also of those that ended, and of failed starts.
+        """One trajectory for each map, by its number: also of dropped maps and failed starts.
 
-        Each is relative to the first keyframe of its map. That of a map that has become part of
-        another one is empty.
+        Each is relative to the first keyframe of its map. The trajectory of a merged map is empty.
         """
         return self.pipeline.recorder.trajectories()
 
@@ -691,7 +691,7 @@ class System:
         Raises
         ------
         IndexError
-            If no map of that number has begun. One that is no more, merged or given up, is empty.
+            If no map of that number has begun. A merged or dropped map is empty.
         """
         self._check_map_index(map_index)
         return keyframe_trajectory(self.pipeline.back_end.map, map_index)
@@ -702,13 +702,13 @@ class System:
         Raises
         ------
         IndexError
-            If no map of that number has begun. One that is no more, merged or given up, is empty.
+            If no map of that number has begun. A merged or dropped map is empty.
         """
         self._check_map_index(map_index)
         return take_snapshot(self.pipeline.back_end.map, map_index)
 
     def _check_map_index(self, map_index: int | None) -> None:
-        """Refuse the number of a map that never began, which would look like an empty one."""
+        """Refuse the number of a map that never began, because it would look like an empty one."""
         if map_index is None:
             return
         remedy = "give a number of those in System.maps, or None for the active map"
@@ -722,7 +722,7 @@ class System:
             raise IndexError(f"there is no map {map_index}; {begun}; {remedy}")
 
     def map_snapshots(self) -> list[MapSnapshot]:
-        """Copies of all maps at any time, the oldest first; `MapSnapshot.map_index` tells which."""
+        """Copies of all maps, the oldest first; `MapSnapshot.map_index` gives the number."""
         return take_snapshots(self.pipeline.back_end.map)
 
     def map_hash(self) -> int:
@@ -730,7 +730,7 @@ class System:
         return int(self.pipeline.back_end.map.content_hash())
 
     def check_map(self) -> list[str]:
-        """Violated invariants of the maps, one sentence each; empty if it is consistent."""
+        """Violated invariants of the maps, one sentence each; empty if the maps are consistent."""
         return list(core.check_invariants(self.pipeline.back_end.map, require_words=True))
 
     def stage_statistics(self) -> dict[str, dict[str, float]]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracking: the pose of every image, and which images become keyframes.
+"""Tracking: the pose of every image, and the choice of keyframes.
 
 Mur-Artal, Montiel and Tardos, "ORB-SLAM: a Versatile and Accurate Monocular SLAM System", 2015,
 section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
@@ -63,21 +63,21 @@ class Tracking:
     slam_map : orbslam2py._core.Map
         The map, shared with the other workers.
     vocabulary : orbslam2py._core.Vocabulary
-        Visual words of new keyframes.
+        Vocabulary for new keyframes.
     mapping : LocalMapping
         Takes the keyframes.
     initializer : Initializer
         How a map begins.
     search : PoseSearch
-        The ways to a pose.
+        Estimates poses.
     acceptance : PoseAcceptance
-        Whether enough speaks for a pose.
+        Validates poses.
     keyframe_decision : KeyframeDecision
         Which frames become keyframes.
     config : Config
         Thresholds.
     has_depth : bool
-        Whether frames measure depths, which become points of the map with a keyframe.
+        Whether frames measure depths; a keyframe makes map points of them.
     new_map_after : float or None
         Seconds that tracking is lost before another map begins beside those there are; None: only
         the old one is searched, for ever.
@@ -114,7 +114,7 @@ class Tracking:
 
     # ---- maps that begin and end -----------------------------------------------------------------
     def restart(self) -> None:
-        """Forget a map that came to nothing, but not the frames that a new one may begin from."""
+        """Forget a failed map, but keep the frames that a new one may begin from."""
         frames = self._initializer.remembered()
         self._begin_anew()
         if frames:
@@ -123,7 +123,7 @@ class Tracking:
         self._initializer.restart(frames)
 
     def reset(self) -> None:
-        """Forget the map's past; the map itself is cleared by the pipeline."""
+        """Forget all frames of the map; the pipeline clears the map itself."""
         self._begin_anew()
         self._initializer.reset()
 
@@ -131,24 +131,24 @@ class Tracking:
         self._state = State(n_relocalizations=self._state.n_relocalizations)
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
-        """Start lost in the map as it is: every image is searched in it, and it is kept.
+        """Start lost in the present map: every image is searched in it, and it is kept.
 
         Parameters
         ----------
         initial_pose : Pose or None
-            ``T_cw`` where the camera may be; tried before all else.
+            ``T_cw`` of a likely pose; tried first.
         """
         maps = frozenset(self._map.maps)
         self._apply(MapLoaded(maps, initial_pose, self._keyframe_decision.spacing))
 
     def go_back(self) -> None:
-        """Be lost in the maps that are left: the one that had begun beside them was dropped."""
+        """Continue lost in the remaining maps: the map that began beside them was dropped."""
         frames = self._initializer.remembered()
         self._apply(MapDropped())
         self._initializer.restart(frames)
 
     def _apply(self, event: Event) -> None:
-        """Replace the state, and carry out what follows from the event."""
+        """Replace the state, and carry out the actions of the event."""
         self._state, actions = self._transitions.next_state(self._state, event)
         for action in actions:
             match action:
@@ -161,20 +161,20 @@ class Tracking:
     # ---- what others ask -------------------------------------------------------------------------
     @property
     def state(self) -> TrackingState:
-        """Before the first map, tracked, or lost."""
+        """Not initialized, tracked, or lost."""
         return self._state.phase
 
     @property
     def n_relocalizations(self) -> int:
-        """How often tracking was found again, over all maps."""
+        """Number of relocalizations, over all maps."""
         return self._state.n_relocalizations
 
     def feature_factor(self, *, localize: bool) -> int:
         """Features that a single camera's next image needs, in multiples of the settings'.
 
-        In localization mode no other thread needs the time, and more features find more of the map.
-        So they do for a camera that is lost, or about to be. But more features are harder to tell
-        apart for a lost camera, so it gets them in every second image.
+        In localization mode no other thread needs the processor, and more features match more of
+        the map. The same holds for a camera that is lost, or nearly lost. But more features are
+        harder to distinguish for a lost camera, so it gets them in every second image.
         """
         state = self._state
         if state.initializing or state.seeks_map:
@@ -187,7 +187,7 @@ class Tracking:
 
     @property
     def motion(self) -> Motion:
-        """The last frame that had a pose, and the velocity."""
+        """The last frame with a pose, and the velocity."""
         return self._state.motion
 
     @property
@@ -203,7 +203,7 @@ class Tracking:
 
     @property
     def start_lines(self) -> FloatArray | None:
-        """While a single camera's map begins: see `Initializer.lines`; else None."""
+        """See `Initializer.lines` while a single camera's map begins; otherwise None."""
         return self._initializer.lines() if self._state.initializing else None
 
     # ---- one image -------------------------------------------------------------------------------
@@ -216,17 +216,17 @@ class Tracking:
         details: bool = False,
         interval: ImuInterval | None = None,
     ) -> TrackingResult:
-        """Find the frame's pose; make it a keyframe if the map needs one.
+        """Estimate the frame's pose; make it a keyframe if the map needs one.
 
-        On return the frame holds pose and associations if the outcome's state is OK; otherwise its
-        pose is None.
+        After the call the frame has pose and associations if the outcome's state is OK; otherwise
+        its pose is None.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             The frame.
         timer : StageTimer
-            Takes the time of each step.
+            Measures the time of each step.
         localize : bool
             Pose only: no keyframes, no new points.
         details : bool
@@ -317,7 +317,7 @@ class Tracking:
     def _begin_map_beside(
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
     ) -> TrackingResult | None:
-        """Begin another map with a frame that is not found; None if the time has not come."""
+        """Begin another map with a frame that was not found; return None if it is too early."""
         if localize or not self._transitions.may_begin_map(self._state, frame.timestamp):
             return None
         self._apply(SearchForMap())
@@ -353,14 +353,14 @@ class Tracking:
 
     @property
     def _is_small(self) -> bool:
-        """Whether the map is given up if tracking is lost."""
+        """Return whether the map is dropped if tracking is lost."""
         active = self._map.active_map
         n_keyframes = self._map.n_keyframes_of(active) - self._initializer.n_between(active)
         return bool(n_keyframes <= self._search.limits.small_map)
 
     # ---- keyframes -------------------------------------------------------------------------------
     def _extend_map(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
-        """Make a tracked frame a keyframe if the map needs one; whether it was made now."""
+        """Make a tracked frame a keyframe if the map needs one; return whether it did."""
         candidate = self._state.keyframe_candidate
         self._state = replace(self._state, keyframe_candidate=None)
         if candidate is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can be seen of a frame: its keypoints, their matches, and more for those who watch."""
+"""Data of a frame for viewers: its keypoints, their matches and more."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from orbslam2py.slam.records import FrameFeatures, TrackingRecord
 
 
 class Tracker(Protocol):
-    """What a watched frame asks of tracking."""
+    """What a watched frame needs from tracking."""
 
     @property
     def local_points(self) -> IntArray: ...  # noqa: D102
@@ -24,22 +24,22 @@ class Tracker(Protocol):
 
 
 class WatchedFrame:
-    """What a watcher is given after every image; copies are made when they are asked for.
+    """Data for a viewer after every image; copies are made on request.
 
-    Valid only during the call: the frame goes on to be the one that the next is compared with.
+    Valid only during the call: the next frame changes the same objects.
 
     Parameters
     ----------
     image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-        As the caller gave it, who may use the memory again.
+        The image as given by the caller, who may reuse the memory.
     record : TrackingRecord
-        What tracking says about it.
+        The record of tracking.
     frame : orbslam2py._core.TrackedFrame
-        Keypoints and what they are matched with.
+        Keypoints and their matches.
     inliers : array of bool, (n,), optional
         See `FrameFeatures.inliers`.
     tracking : Tracker
-        The state machine, as the frame left it.
+        Tracking after the frame.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class WatchedFrame:
         return copy
 
     def pixels(self) -> npt.NDArray[np.float32]:
-        """Where the keypoints lie in the image as it came, (n, 2)."""
+        """Pixels of the keypoints in the given image, (n, 2)."""
         return pixels_as_given(self._frame.features)
 
     def local_points(self) -> IntArray:
@@ -90,13 +90,13 @@ FrameWatcher = Callable[[WatchedFrame], None]
 
 
 def accepted_keypoints(frame: core.TrackedFrame) -> npt.NDArray[np.bool_]:
-    """Which keypoints have a point that agrees with the pose, (n,)."""
+    """Mask of the keypoints with a point that is an inlier, (n,)."""
     accepted: npt.NDArray[np.bool_] = (frame.map_points >= 0) & (frame.outlier == 0)
     return accepted
 
 
 def pixels_as_given(frame: core.Frame) -> npt.NDArray[np.float32]:
-    """Where the keypoints lie in the image as it came, not undistorted, (n, 2)."""
+    """Pixels of the keypoints in the given image, not undistorted, (n, 2)."""
     raw = frame.raw_keypoints
     return raw if len(raw) else frame.keypoints
 
@@ -104,14 +104,14 @@ def pixels_as_given(frame: core.Frame) -> npt.NDArray[np.float32]:
 def frame_features(
     frame: core.TrackedFrame, inliers: npt.NDArray[np.bool_] | None = None
 ) -> FrameFeatures:
-    """Copy the keypoints of a frame and what they were matched to.
+    """Copy the keypoints of a frame and their matches.
 
     Parameters
     ----------
     frame : orbslam2py._core.TrackedFrame
         The frame.
     inliers : array of bool, (n,), optional
-        `accepted_keypoints` as they were before points were made or dropped.
+        `accepted_keypoints` from before points were created or dropped.
     """
     features = frame.features
     return FrameFeatures(

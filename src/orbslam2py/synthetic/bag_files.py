@@ -38,20 +38,20 @@ _NANO = 10**9
 
 @dataclass(frozen=True)
 class BagContents:
-    """What is written to a bag.
+    """The contents of a bag.
 
     Attributes
     ----------
     sensor
         ``mono``, ``stereo`` or ``rgbd``.
     camera
-        The camera; both of a pair are alike.
+        The camera; both cameras of a pair are equal.
     nanoseconds
         Time stamps of the frames.
     T_wc
         True poses of the camera, (n, 4, 4).
     load
-        Images of a frame: that of the camera, and of what belongs to it; depth is uint16.
+        Images of a frame: that of the camera, and the right or depth image; depth is uint16.
     depth_per_metre
         Units of the depth per metre.
     """
@@ -74,7 +74,7 @@ def write_bag(
     contents
         What to write.
     folder
-        A folder that is there.
+        An existing folder.
     layout
         One of `BAG_LAYOUTS`.
     progress

@@ -45,14 +45,14 @@ _SENSORS = {
 
 
 class WritableSequence(Sequence, Protocol):
-    """What a sequence must tell besides its images to be written as a data set.
+    """The data of a sequence, besides its images, that a data set needs.
 
     Attributes
     ----------
     options
         What was asked for.
     camera
-        The camera; both cameras of a pair are alike.
+        The camera; both cameras of a pair are equal.
     baseline
         Distance of the cameras of a pair [m].
     nanoseconds
@@ -77,7 +77,7 @@ class WritableSequence(Sequence, Protocol):
         ...
 
     def ground_truth(self) -> Trajectory:
-        """Return the true pose of every frame: there is one for all."""
+        """Return the true pose of every frame."""
         ...
 
 
@@ -87,7 +87,7 @@ def choose_layout(layout: Layout | str | None, sensor: Sensor) -> Layout:
     Raises
     ------
     SettingsError
-        If there is no such layout, or it has no place for the sensor's images.
+        If there is no such layout, or it does not support the sensor.
     """
     if layout is None:
         return Layout.KITTI if sensor is Sensor.STEREO else Layout.TUM
@@ -329,7 +329,7 @@ def _check_replaceable(folder: Path, *, force: bool) -> None:
 
 
 def _other_work(folder: Path) -> Path | None:
-    """What lies in the folder of a synthetic sequence and does not belong to it."""
+    """Return files in the folder of a synthetic sequence that do not belong to it."""
     try:
         told = json.loads((folder / MARKER).read_text(encoding="utf-8"))[_ENTRIES]
         written = {MARKER: 1, **{str(name): int(n_files) for name, n_files in told.items()}}

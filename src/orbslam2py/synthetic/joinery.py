@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Worlds of few pieces: a table top, a wall, a lift door; and ways in front of them."""
+"""Worlds of few parts: a table top, a wall, a lift door; and the camera paths in front of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class MovingPart:
     Attributes
     ----------
     make_world
-        Makes it from a seed, where it is at first.
+        Makes it from a seed, at its initial position.
     shift
         Its displacement in the world [m], (3,), at a time [s].
     """
@@ -124,7 +124,7 @@ def make_lift(seed: int) -> core.World:
 
 
 def lift_door() -> tuple[MovingPart, ...]:
-    """Both halves of the door; it opens and shuts every eight seconds, first after two."""
+    """Both halves of the door; it opens and closes every eight seconds, first after two."""
     return (_half_door(-1), _half_door(1))
 
 
@@ -145,7 +145,7 @@ def _half_door(side: int) -> MovingPart:
 
 
 def _door_open(seconds: float) -> float:
-    """From 0, shut, to 1, open."""
+    """From 0, closed, to 1, open."""
     phase = (seconds - 2.0) % _DOOR_PERIOD if seconds > 2.0 else 0.0
     opening = min(1.0, phase / _DOOR_SLIDES)
     shutting = min(1.0, max(0.0, phase - _DOOR_PERIOD / 2) / _DOOR_SLIDES)
@@ -154,7 +154,7 @@ def _door_open(seconds: float) -> float:
 
 # ---- ways: camera to world (4, 4) at a time [s] --------------------------------------------------
 def over_the_table(seconds: float) -> FloatArray:
-    """Once around above the table in 15 s, looking down at its middle from 55 degrees."""
+    """A circle above the table in 15 s, looking at its centre from 55 degrees."""
     phase = 2 * math.pi * seconds / 15.0
     radius = 0.38 + 0.08 * math.sin(2 * phase)
     position = [radius * math.sin(phase), 0.08 * math.sin(1.5 * phase), -radius * math.cos(phase)]
@@ -163,7 +163,7 @@ def over_the_table(seconds: float) -> FloatArray:
 
 
 def along_the_wall(seconds: float) -> FloatArray:
-    """To and fro over 6 m in 24 s, 1.3 to 1.9 m from the wall, nearly square to it."""
+    """Back and forth over 6 m in 24 s, 1.3 to 1.9 m from the wall, nearly perpendicular to it."""
     phase = 2 * math.pi * seconds / 24.0
     T_wc = _rotated(0.04 * math.sin(1.7 * phase), 0.15 * math.sin(3 * phase), 0.0)
     T_wc[:3, 3] = [3 * math.sin(phase), 0.15 * math.sin(4 * phase), 0.3 * math.sin(2 * phase)]
@@ -171,7 +171,7 @@ def along_the_wall(seconds: float) -> FloatArray:
 
 
 def before_the_door(seconds: float) -> FloatArray:
-    """Waiting: swaying by 25 cm to the sides in 6 s, 15 cm to the front."""
+    """Waiting: swaying by 25 cm sideways in 6 s, and by 15 cm forwards."""
     phase = 2 * math.pi * seconds / 6.0
     T_wc = _rotated(0.03 * math.sin(1.3 * phase), 0.08 * math.sin(phase), 0.0)
     T_wc[:3, 3] = [0.25 * math.sin(phase), 0.05 * math.sin(2.2 * phase), 0.15 * math.sin(phase / 2)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What happens between the world and the image: smear, jumps of exposure, a hand, noise."""
+"""Effects between the world and the image: motion blur, jumps of exposure, a hand, noise."""
 
 from __future__ import annotations
 
@@ -27,16 +27,17 @@ def smeared(
     T_middle: FloatArray,
     T_shut: FloatArray,
 ) -> NDArray[np.float32]:
-    """Smear an image by the camera's motion while the shutter is open.
+    """Blur an image by the camera's motion while the shutter is open.
 
-    Every pixel is averaged along the way that its point takes through the image, straight from
-    the opening to the middle and from there to the shutting. What is seen past an edge in between
-    is left out: good where smears are short beside things.
+    Every pixel is averaged along the path of its point in the image, in straight lines from the
+    opening to the middle of the exposure and from there to its end. Background that becomes visible
+    beside an edge meanwhile is left out: a good approximation for blur that is short relative to
+    objects.
 
     Parameters
     ----------
     grey, depth
-        As seen in the middle, (h, w); depth along z [m], 0 where nothing is hit.
+        Image in the middle of the exposure, (h, w); depth along z [m], 0 where no surface is hit.
     camera
         Intrinsics.
     T_open, T_middle, T_shut
@@ -74,9 +75,9 @@ def smeared(
 def _flow(
     depth: NDArray[np.float32], camera: CameraSettings, T_wc: FloatArray, T_wd: FloatArray
 ) -> NDArray[np.float32]:
-    """From each pixel of camera c to where camera d sees its point, (h, w, 2) pixels.
+    """Return for each pixel of camera c the pixel of its point in camera d, (h, w, 2).
 
-    Pixels that come behind camera d stay; those without depth are infinitely far.
+    Pixels of points behind camera d do not move; those without depth are infinitely far.
     """
     T_dc = inverse_poses(T_wd) @ T_wc
     height, width = depth.shape
@@ -100,7 +101,7 @@ def _flow(
 def exposed(
     image: NDArray[np.float32], exposure: float, noise: float, seed: list[int]
 ) -> ByteArray:
-    """Grey values as they come out of the camera, uint8: multiplied, with noise, rounded."""
+    """Return grey values of the camera, uint8: multiplied, with noise, rounded."""
     values = image * np.float32(exposure)
     if noise > 0:
         random = np.random.default_rng(seed)
@@ -112,7 +113,7 @@ _JUMPS = 997  # drawn at once; then they come again
 
 
 def exposure_at(seconds: float, limits: tuple[float, float], seed: int) -> float:
-    """Factor on the grey values at a time: another one 0.5 to 1.5 s after the last."""
+    """Return the factor on the grey values at a time: a new one 0.5 to 1.5 s after the last."""
     random = np.random.default_rng([seed, 0xE])
     ends = np.cumsum(random.uniform(0.5, 1.5, _JUMPS))
     factors = np.exp(random.uniform(math.log(limits[0]), math.log(limits[1]), _JUMPS))
@@ -123,13 +124,13 @@ _HAND_SLIDES = 0.15  # seconds until it covers everything
 
 
 def hand_rows(seconds: float, begin: float, end: float, height: int) -> int:
-    """How many rows of the image, from below, a hand covers that comes and goes at these times."""
+    """Return how many rows of the image, from below, a moving hand covers at these times."""
     share = min((seconds - begin) / _HAND_SLIDES + 1, (end - seconds) / _HAND_SLIDES + 1)
     return round(height * min(1.0, max(0.0, share)))
 
 
 def check_cover(begin: float, lasting: float, seconds: FloatArray) -> None:
-    """Raise `SettingsError` unless a hand covers some of the images of these times, but not all."""
+    """Raise `SettingsError` unless a hand covers some of the images, but not all."""
     if lasting == 0:
         return
     end = begin + lasting
@@ -149,7 +150,7 @@ def check_cover(begin: float, lasting: float, seconds: FloatArray) -> None:
 def covered(
     image: ByteArray, depth: NDArray[np.float32], rows: int
 ) -> tuple[ByteArray, NDArray[np.float32]]:
-    """Image and depth behind a hand: dark, without any detail, too close for the depth."""
+    """Image and depth behind a hand: dark, without details, too close for depth."""
     if rows == 0:
         return image, depth
     height, width = image.shape

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a camera goes along its way: evenly, or as is hard to follow."""
+"""Motions of a camera along its path: uniform, or hard to track."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from orbslam2py._arrays import FloatArray
 
 
 class SyntheticMotion(str, Enum):
-    """The motions there are. The draws in them come from the sequence's seed."""
+    """The motions there are. Their random numbers come from the sequence's seed."""
 
     SMOOTH = "smooth"
     """Evenly along the way."""
     TURNS_AT_ONCE = "turns-at-once"
-    """Looks aside and back, 1 to 6 degrees a frame from one frame to the next."""
+    """Looks aside and back, with sudden turns of 1 to 6 degrees a frame."""
     STOPS = "stops"
-    """Goes and stands, from one frame to the next."""
+    """Starts and stops within one frame."""
     SHAKES = "shakes"
-    """Trembles by up to 2 degrees and 2 cm, in bursts."""
+    """Shakes by up to 2 degrees and 2 cm, in bursts."""
     STAIRS = "stairs"
-    """Up and down four steps of 17 cm, with a jerk at each."""
+    """Up and down four steps of 17 cm, with a shock at each."""
     TURN_ON_THE_SPOT = "turn-on-the-spot"
-    """Stands, turns around by up to 180 degrees at 40 to 120 degrees a second, and back."""
+    """Stops, turns by up to 180 degrees at 40 to 120 degrees a second, and turns back."""
 
     def __str__(self) -> str:
         return self.value
@@ -38,14 +38,14 @@ _ROUNDS = 64  # of a schedule, after which it comes again
 
 @dataclass(frozen=True)
 class Schedule:
-    """Where on its way a camera is and how far aside it looks, in straight lines over time.
+    """Position of a camera on its path and its yaw, piecewise linear over time.
 
     Attributes
     ----------
     seconds
-        Of the knots, (k,), from 0; after the last one everything comes again.
+        Times of the knots, (k,), from 0; the motion repeats after the last one.
     on_way
-        Seconds that an even motion would have taken to get there, (k,).
+        Time in seconds of a uniform motion to the same position, (k,).
     yaw
         Radians to the right, (k,); 0 at both ends.
     """
@@ -55,13 +55,13 @@ class Schedule:
     yaw: FloatArray
 
     def at(self, seconds: float) -> tuple[float, float]:
-        """Time on the way [s] and yaw [rad] at a time [s]."""
+        """Return path time [s] and yaw [rad] at a time [s]."""
         rounds, rest = divmod(seconds, float(self.seconds[-1]))
         on_way = rounds * self.on_way[-1] + np.interp(rest, self.seconds, self.on_way)
         return float(on_way), float(np.interp(rest, self.seconds, self.yaw))
 
     def duration(self, on_way: float) -> float:
-        """Time [s] at which a time on the way [s] is reached."""
+        """Return the time [s] at which a path time [s] is reached."""
         rounds, rest = divmod(on_way, float(self.on_way[-1]))
         return float(rounds * self.seconds[-1] + np.interp(rest, self.on_way, self.seconds))
 
@@ -74,7 +74,7 @@ class Motion:
     kind
         Which.
     fps
-        Frames per second: turns that begin at once are so fast a frame.
+        Frames per second: they determine the speed of sudden turns.
     seed
         Of the draws.
     """
@@ -88,15 +88,15 @@ class Motion:
         self._phases = random.uniform(0.0, 2 * np.pi, (3, 6))
 
     def on_way(self, seconds: float) -> float:
-        """Seconds that an even motion would have taken to get where the camera is."""
+        """Return the time in seconds of a uniform motion to the camera's position."""
         return seconds if self._schedule is None else self._schedule.at(seconds)[0]
 
     def duration(self, on_way: float) -> float:
-        """Seconds that this motion takes where an even one takes `on_way`."""
+        """Return the duration [s] of this motion for `on_way` seconds of uniform motion."""
         return on_way if self._schedule is None else self._schedule.duration(on_way)
 
     def applied(self, T_wc: FloatArray, seconds: float) -> FloatArray:
-        """A pose on the way as the motion makes it, camera to world (4, 4)."""
+        """Return the pose on the path with this motion, camera to world (4, 4)."""
         if self._kind is SyntheticMotion.SHAKES:
             return np.asarray(T_wc @ self._tremor(seconds))
         if self._kind is SyntheticMotion.STAIRS:
@@ -137,7 +137,7 @@ def _schedule(kind: SyntheticMotion, fps: float, random: np.random.Generator) ->
 
 
 def _from_parts(seconds: FloatArray, on_way: FloatArray, yaw: FloatArray) -> Schedule:
-    """Put together durations, times on the way and yaws at the end of parts, (rounds, parts)."""
+    """Join durations, path times and final yaws of parts, (rounds, parts)."""
 
     def summed(values: FloatArray) -> FloatArray:
         return np.concatenate([[0.0], np.cumsum(values)])
@@ -152,7 +152,7 @@ _LIFTED = 0.25  # seconds in which the camera rises at a step
 
 
 def _on_stairs(T_wc: FloatArray, seconds: float) -> FloatArray:
-    """Raised by the steps climbed so far, nodding at each."""
+    """Return the pose raised by the steps climbed so far, with a nod at each."""
     step, since = divmod(seconds, _PER_STEP)
     share = min(1.0, since / _LIFTED)
     climbed = (step + 0.5 - 0.5 * math.cos(math.pi * share)) % (2 * _STEPS)

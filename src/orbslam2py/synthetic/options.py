@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a synthetic sequence shall be: world, sensor, length, disturbances."""
+"""Options of a synthetic sequence: world, sensor, length, disturbances."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from orbslam2py.synthetic.scenes import (
 
 @dataclass(frozen=True)
 class SyntheticOptions:
-    """What a synthetic sequence shall be. None stands for the world's own value.
+    """Options of a synthetic sequence. None means the world's own value.
 
     Attributes
     ----------
@@ -33,66 +33,65 @@ class SyntheticOptions:
     sensor
         What delivers the images.
     frames
-        Number of images; by default the whole way.
+        Number of images; by default the whole path.
     laps
-        How often to go around, instead of `frames`; only where the way comes back to its start
-        (1.2 in corridors and around the block, 1.1 in the figure of eight).
+        Number of rounds, instead of `frames`; only if the path returns to its start (1.2 in
+        corridors and around the block, 1.1 in the figure of eight).
     length
         Metres of the straight street (600).
     fps
         Frames per second (20 indoors, 10 in streets).
     speed
-        Metres per second along the way (0.7 in corridors, 0.4 between the rooms, 10 in streets);
-        not where there is no way to follow (room, table-top, wall, lift-door).
+        Metres per second along the path (0.7 in corridors, 0.4 between the rooms, 10 in streets);
+        not in worlds without a path (room, table-top, wall, lift-door).
     pace
         Factor on the usual speed, in every world.
     motion
-        How the camera goes along its way.
+        Motion of the camera along its path.
     corners
-        How the look direction follows the bends of a way: `Corners`; only where there are bends.
+        How the viewing direction follows the bends of a path: `Corners`; only if there are bends.
     size
         Width and height in pixels (640 x 480, in streets 1241 x 376).
     seed
-        Another seed, another wallpaper and furniture.
+        Another seed gives other wallpaper and furniture.
     noise
         Standard deviation of the grey values' noise, grey levels.
     exposure
-        Factor on the grey values. Two numbers: the factor jumps between frames, once a second or
-        so, and lies between them.
+        Factor on the grey values. Two numbers: the factor jumps between frames, about once a
+        second, and lies between them.
     blur
-        How long the shutter is open, in times between two frames (0 to 1): what the camera moves
-        by meanwhile is smeared. The truth is where it is in the middle.
+        Exposure time, in times between two frames (0 to 1): the camera's motion during it blurs the
+        image. The ground truth is the pose in the middle of the exposure.
     cover
-        Seconds that a hand is over the lens, in the middle of the sequence. Two numbers: when it
-        comes [s], and for how long it stays.
+        Seconds that a hand covers the lens, in the middle of the sequence. Two numbers: start [s]
+        and duration [s].
     pieces
-        Number of pieces of equal length that the path is cut into; they come one after the other.
-        `frames` and `laps` are those of the path before it is cut.
+        Number of parts of equal length that the path is cut into; they follow each other. `frames`
+        and `laps` are those of the path before the cut.
     order
-        Numbers of the pieces that come, from 0; those that are not named are left out. By default
-        all of them come, shuffled by the seed.
+        Numbers of the used parts in their order, from 0; the others are left out. By default all of
+        them, shuffled by the seed.
     gap
-        Seconds in the dark between two pieces: the camera stands where the one before ends
-        (3 with `pieces`).
+        Seconds of darkness between two parts, at the end of the one before (3 with `pieces`).
     overlap
-        Seconds by which each piece begins earlier and ends later on the way, so that neighbours
-        show common places (0 with `pieces`).
+        Seconds by which each part is longer at its start and its end, so that neighbours share
+        places (0 with `pieces`).
     depth_noise
         Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
     lateral
-        Metres to the right of the way: the same places from other viewpoints. Limited by the
+        Offset to the right of the path [m]: the same places from other viewpoints. Limited by the
         walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the blocks).
     yaw
         Degrees to the right of the direction of travel.
     lens
-        Camera with width and height, through whose lens the images are seen: any model that
-        `orbslam2py.CameraSettings` has. One camera or RGB-D, without `blur` and `size`. None for a
+        Camera with width and height, whose lens the images have: any model of
+        `orbslam2py.CameraSettings`. Single camera or RGB-D, without `blur` and `size`. None for a
         pinhole without distortion.
     imu
         Whether there is an IMU beside the camera. Its path is a smooth curve through the poses of
-        the images, which stay as they are; not with `pieces`, between which the camera jumps.
+        the images, which do not change; not with `pieces`, between which the camera jumps.
     imu_noise
-        Name of a chip whose noise the samples have, such as ``bmi088``, with a bias that walks; by
+        Name of a chip with the noise of the samples, such as ``bmi088``, and a bias that drifts; by
         default they are exact.
     lens_pair
         Stereo settings of a raw pair, through whose two lenses the images are seen: with a

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A way cut into pieces that come in another order, with darkness between them."""
+"""A path cut into parts in another order, with darkness between them."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _STREAM = 0x0BDE
 
 @dataclass(frozen=True, eq=False)
 class Arrangement:
-    """Which image of the whole way each image is, and which are taken in the dark."""
+    """Which image of the whole path each image is, and which are dark."""
 
     of_way: IntArray
-    """(n,) number on the way; in the dark that of the image before: the camera stands."""
+    """(n,) number on the path; in the dark that of the image before, because the camera stands."""
     dark: npt.NDArray[np.bool_]
     """(n,)"""
 
 
 def arrange(options: SyntheticOptions, n_images: int, fps: float) -> Arrangement:
-    """Cut a way into the pieces that are asked for.
+    """Cut a path into the requested parts.
 
     Parameters
     ----------
     options
-        Pieces, their order, gap and overlap.
+        Parts, their order, gap and overlap.
     n_images
         Of the whole way.
     fps
@@ -43,7 +43,7 @@ def arrange(options: SyntheticOptions, n_images: int, fps: float) -> Arrangement
     Raises
     ------
     SettingsError
-        If there are more pieces than images.
+        If there are more parts than images.
     """
     n_pieces = options.pieces
     if n_pieces is None:
@@ -70,7 +70,7 @@ def arrange(options: SyntheticOptions, n_images: int, fps: float) -> Arrangement
 
 
 def _shuffled(n_pieces: int, seed: int) -> tuple[int, ...]:
-    """Another order than that of the way, as soon as there is one."""
+    """Return an order that differs from that of the path, if there is one."""
     random = np.random.default_rng([seed, _STREAM])
     while True:
         order = tuple(random.permutation(n_pieces).tolist())

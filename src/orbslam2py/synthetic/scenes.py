@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The synthetic worlds and the camera's way through each."""
+"""The synthetic worlds and the camera's path in each."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from orbslam2py.synthetic.joinery import MovingPart
 
 
 class SyntheticWorld(str, Enum):
-    """The worlds there are, with the way the camera takes through them."""
+    """The available worlds, with the path of the camera in each."""
 
     ROOM = "room"
-    """A room of 6 x 6 m; the camera looks around from its middle, once in 30 s."""
+    """A room of 6 x 6 m; the camera turns in its centre, once in 30 s."""
     CORRIDOR = "corridor"
-    """A corridor around a block; one lap (26 m) and a bit."""
+    """A corridor around a block; a little more than one lap (26 m)."""
     REPEATING_CORRIDOR = "repeating-corridor"
-    """The same, but the pictures on its walls come again every four metres."""
+    """The same, but the pictures on its walls repeat every four metres."""
     FIGURE_EIGHT = "figure-eight"
-    """Two corridors with a common leg; two loops and a bit."""
+    """Two corridors with a common part; a little more than two loops."""
     STREET = "street"
     """A drive along a straight street, of 600 m or up to 3500 m."""
     STREET_LAP = "street-lap"
-    """A drive around a block of houses; one lap (600 m) and a bit."""
+    """A drive around a block of houses; a little more than one lap (600 m)."""
     TWO_ROOMS = "two-rooms"
-    """From a room through a door and a passage into a room that looks the same."""
+    """From a room through a door and a passage into an identical room."""
     STREET_BLOCK = "street-block"
-    """A drive around a smaller block of houses; one lap (320 m) and a bit."""
+    """A drive around a smaller block of houses; a little more than one lap (320 m)."""
     TABLE_TOP = "table-top"
-    """Around above a table with low things on it, looking down."""
+    """A circle above a table with low objects on it, looking down."""
     WALL = "wall"
-    """To and fro along a wall that fills the view."""
+    """Back and forth along a wall that fills the view."""
     LIFT_DOOR = "lift-door"
-    """Waiting before a lift whose door slides open and shut."""
+    """Waiting in front of a lift whose door opens and closes."""
 
     def __str__(self) -> str:
         return self.value
 
 
 class Corners(str, Enum):
-    """How the look direction follows the bends of a way."""
+    """How the viewing direction follows the bends of a path."""
 
     ROUND = "round"
     """It begins to turn before a bend: the turn rate is continuous."""
     SHARP = "sharp"
-    """It turns with the way: at once, by 4 degrees a frame in streets."""
+    """It turns with the path: suddenly, by 4 degrees a frame in streets."""
 
     def __str__(self) -> str:
         return self.value
@@ -61,24 +61,24 @@ class Corners(str, Enum):
 
 @dataclass(frozen=True)
 class Scene:
-    """A world and the way through it.
+    """A world and the camera's path in it.
 
     Attributes
     ----------
     make_world
         Makes the world from a seed.
     way
-        Along corridors and streets; None where there is none.
+        Path along corridors and streets; None if there is none.
     looking
-        Without a way: the pose, camera to world (4, 4), at a time [s].
+        Without a path: the pose, camera to world (4, 4), at a time [s].
     period
-        Seconds that this usually takes.
+        Usual duration in seconds.
     speed
         Usual speed [m/s].
     outdoors
         Open above; seen from a car.
     moving
-        What slides in the world.
+        Moving parts of the world.
     """
 
     make_world: Callable[[int], core.World]
@@ -90,9 +90,9 @@ class Scene:
     moving: tuple[MovingPart, ...] = ()
 
     def seconds(self, speed: float, laps: float) -> float:
-        """Return the time [s] that `laps` times the way take at a speed [m/s].
+        """Return the time [s] of `laps` rounds of the path at a speed [m/s].
 
-        Without a way it takes its own time, whatever is asked for.
+        Without a path it is the world's own time.
         """
         return self.period if self.way is None else laps * self.way.length() / speed
 
@@ -108,11 +108,11 @@ class Scene:
         speed
             Metres per second.
         lateral
-            Metres to the right of the way.
+            Offset to the right of the path [m].
         yaw
             Radians to the right of the direction of travel.
         sharp
-            The look direction turns with the way, at once.
+            Whether the viewing direction turns with the path, without smoothing.
         """
         if self.way is not None:
             # A car rolls gently where a walker sways at every step.
@@ -129,7 +129,7 @@ class Scene:
 
 
 def _turned_at_once(way: core.Way, distance: float, T_wc: FloatArray) -> FloatArray:
-    """A pose on a way, turned about its place on it from the smoothed to the way's own heading."""
+    """Return a pose on a path, rotated from the smoothed heading to the path's own."""
     around = 1e-4  # metres
     before, here, after = (way.T_wc(distance + s, sway=0.0) for s in (-around, 0.0, around))
     step = after[:3, 3] - before[:3, 3]
@@ -193,7 +193,7 @@ WITHOUT_WAY = {
 
 
 def make_scene(world: SyntheticWorld, length: float | None = None) -> Scene:
-    """Choose the world and the way; the world itself is made later, when the seed is known.
+    """Choose the world and the path; the world is made later, when the seed is known.
 
     Parameters
     ----------

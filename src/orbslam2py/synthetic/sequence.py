@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sequences made on the spot: textured rooms, corridors and streets with exact ground truth.
+"""Rendered sequences: textured rooms, corridors and streets with exact ground truth.
 
 >>> options = SyntheticOptions(world="corridor", sensor="stereo", frames=100)
 >>> sequence = SyntheticSequence(options)  # doctest: +SKIP
@@ -45,14 +45,14 @@ DEPTH_PER_METRE = 5000.0
 
 
 class SyntheticSequence(SyntheticImu, FramesInOrder):
-    """Renders its images when they are asked for; has the interface of the recorded sequences.
+    """Renders its images on request; has the interface of the recorded sequences.
 
     Parameters
     ----------
     options
         World, sensor, length and disturbances.
     threads
-        Rendering threads; the images do not depend on it.
+        Number of rendering threads; the images do not depend on it.
     """
 
     #: Direction of up in the world of the ground truth: y points down.
@@ -78,7 +78,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         lens.check_cover(*self._covered, self.timestamps)
 
     def _seconds_on_way(self, index: int) -> float:
-        """When the camera is on its way where an image is taken."""
+        """Path time of the camera for each image."""
         return float(np.rint(self._arrangement.of_way[index] * (1e9 / self._fps))) / 1e9
 
     @property
@@ -184,8 +184,8 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         Returns
         -------
         Images
-            Grey images (height, width) uint8; depth (height, width) uint16 in 1/5000 m, 0 where
-            there is none or more than 13.1 m.
+            Grey images (height, width) uint8; depth (height, width) uint16 in 1/5000 m, 0 without
+            depth or beyond 13.1 m.
 
         Raises
         ------
@@ -203,7 +203,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
     # ---- what only a made-up world knows ---------------------------------------------------------
     @property
     def lap_length(self) -> float | None:
-        """Metres around, without the swaying; None where the way does not come back."""
+        """Length of a round in metres, without swaying; None if the path does not return."""
         way = self._scene.way
         return way.length() if way is not None and self._world in LAPS else None
 
@@ -230,7 +230,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         return self._motion.applied(on_way, seconds)
 
     def covered(self, index: int) -> bool:
-        """Whether a hand is over the lens, be it in part, or the image is taken in the dark.
+        """Return whether a hand covers the lens, also partly, or the image is dark.
 
         Raises
         ------
@@ -250,25 +250,25 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         return lens.hand_rows(seconds, begin, begin + lasting, self._size[1])
 
     def _seconds_of_cover(self) -> tuple[float, float]:
-        """When the hand comes, and how long it stays."""
+        """Return start and duration of the hand."""
         cover = self.options.cover
         if isinstance(cover, tuple | list):
             return cover[0], cover[1]
         return (self._n_frames / self._fps - cover) / 2, cover
 
     def view(self, T_wc: FloatArray, number: int = 0, *, exposure: float | None = None) -> Images:
-        """Render the images seen from anywhere: without smear and without a hand over the lens.
+        """Render images from any pose, without blur and without a hand.
 
-        What moves in the world is where it is at the beginning.
+        Moving parts of the world are at their initial positions.
 
         Parameters
         ----------
         T_wc
             Pose of the (left) camera, camera to world, (4, 4).
         number
-            Seeds the noise together with the sequence's seed: not negative.
+            Seed of the noise, together with the sequence's seed: not negative.
         exposure
-            Factor on the grey values; that of the options if None (of two the first).
+            Factor on the grey values; None: that of the options (the first of two).
 
         Returns
         -------
@@ -285,7 +285,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         return Images(image)
 
     def exact_depth(self, index: int) -> NDArray[np.float32]:
-        """Depth of the (left) image along z, (height, width) [m]; 0 where nothing is hit."""
+        """Depth of the (left) image along z, (height, width) [m]; 0 where no surface is hit."""
         index = index_of(index, len(self))
         seconds = self._seconds_on_way(index)
         T_wl = self._left_of(self.T_wc(index))
@@ -304,20 +304,20 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         Parameters
         ----------
         folder
-            Appears when everything is written.
+            The folder; it appears after everything is written.
         layout
             ``tum`` (mono, RGB-D), ``kitti`` or ``euroc`` (mono, stereo); ``rosbag1``, ``rosbag2``
             or ``mcap`` (all, with the package rosbags); by default TUM for RGB-D and mono, KITTI
             for stereo.
         force
-            Replace a folder that holds a synthetic sequence.
+            Replace a folder that contains a synthetic sequence.
         progress
             Called after each frame with the number of frames written and of all frames.
 
         Raises
         ------
         SettingsError
-            If the layout has no place for the sensor's images.
+            If the layout does not support the sensor.
         DatasetError
             If the folder exists and is not empty.
         OSError
@@ -361,7 +361,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
     def _seen(
         self, T_wc: FloatArray, index: int, *, right: bool
     ) -> tuple[ByteArray, NDArray[np.float32]]:
-        """One image of a frame, with all that is between the world and it, and its depth."""
+        """Return one image of a frame, with all effects, and its depth."""
         options = self.options
         seconds = self._seconds_on_way(index)
         number = 2 * index + right
@@ -444,7 +444,7 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
     def _composed(
         self, T_wc: FloatArray, seconds: float, **image: Any
     ) -> tuple[ByteArray, NDArray[np.float32]]:
-        """Render a pinhole image of the world and of what moves in it."""
+        """Return one side of the cube around a camera, without noise."""
         grey, depth = self._rendered(self._built, T_wc, image)
         for part, world in zip(self._scene.moving, self._built_parts, strict=True):
             # A part that moves is one that stands still and a camera that moves the other way.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A smooth path through poses: rates and accelerations are continuous."""
+"""A smooth path through poses: angular rates and accelerations are continuous."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class PoseSpline:
     Parameters
     ----------
     t
-        Seconds, growing, (n,), n >= 2.
+        Seconds, increasing, (n,), n >= 2.
     T_wb
         Poses of the body in the world, (n, 4, 4).
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images through any camera model, put together from pinhole images of the sides of a cube."""
+"""Images of any camera model, composed of pinhole images of the sides of a cube."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class WideView:
     Parameters
     ----------
     model
-        Of the images. Pixels at which it shows nothing are black and have no depth.
+        Of the images. Pixels outside the domain of the model are black and have no depth.
     """
 
     def __init__(self, model: CameraModel) -> None:
@@ -89,7 +89,7 @@ class WideView:
         Returns
         -------
         array (h, w), array (h, w)
-            Grey levels, and depth along z [m]: 0 where nothing is hit, or beside the camera.
+            Grey levels, and depth along z [m]: 0 where no surface is hit, or beside the camera.
         """
         image = np.zeros(self._shape, np.float32)
         depth = np.zeros(self._shape, np.float32)

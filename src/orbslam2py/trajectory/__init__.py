@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths over time: poses with time stamps, their files, and which belong together."""
+"""Trajectories: poses with time stamps, their files, and their association."""
 
 from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
 from orbslam2py.trajectory.columns import QuaternionOrder

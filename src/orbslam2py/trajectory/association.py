@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which time stamps of two lists belong together."""
+"""Association of the time stamps of two lists."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def associate(
 ) -> tuple[IntArray, IntArray]:
     """Pair the time stamps of two lists, each used at most once.
 
-    Of all pairs that differ by less than `max_difference` the nearest is taken, then the nearest
-    among the stamps still free, and so on; ties go to the earlier stamps. This is the procedure of
-    the tools of the TUM RGB-D benchmark (Sturm et al. 2012).
+    The nearest of all pairs that differ by less than `max_difference` is used, then the nearest
+    among the remaining stamps, and so on; of equal pairs the one with earlier stamps. This is the
+    procedure of the tools of the TUM RGB-D benchmark (Sturm et al. 2012).
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _candidates(
 
 
 def _take_greedily(i: IntArray, j: IntArray, n_first: int, n_second: int) -> IntArray:
-    """Positions in the list of candidates (best first) that the greedy walk takes."""
+    """Return the positions in the list of candidates (best first) that the greedy search uses."""
     remaining = np.arange(len(i))
     taken = []
     # A candidate that is the best one of both its members is taken whatever happens before it, so

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which columns of a text table hold time, position and rotation."""
+"""The columns of a text table with time, position and rotation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _VECTORS = {"q": "xyzw", "p": "xyz", "v": "xyz", "bg": "xyz", "ba": "xyz"}
 
 
 class QuaternionOrder(str, Enum):
-    """Order in which a file holds the four numbers of a quaternion."""
+    """Order of the four numbers of a quaternion in a file."""
 
     XYZW = "xyzw"
     """The real part w last, as in TUM's files."""
@@ -39,13 +39,13 @@ class QuaternionOrder(str, Enum):
         Raises
         ------
         DatasetError
-            Listing the names, if there is none like that.
+            For an unknown name; the message lists the names.
         """
         return member_of(cls, value, "the order of the quaternions")
 
     @property
     def other(self) -> QuaternionOrder:
-        """The other of both orders."""
+        """Return the other order."""
         return QuaternionOrder.WXYZ if self is QuaternionOrder.XYZW else QuaternionOrder.XYZW
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class QuaternionOrder(str, Enum):
 
 @dataclass(frozen=True)
 class Columns:
-    """Where a table holds poses; columns are counted from 0.
+    """The columns of poses in a table, counted from 0.
 
     Attributes
     ----------
@@ -65,14 +65,14 @@ class Columns:
     position
         Columns of x, y and z; empty for matrices.
     quaternion
-        Columns of x, y, z and w where a head names them; the four columns as they stand else, in
-        an order that the columns do not tell.
+        Columns of x, y, z and w if a header names them; otherwise the four columns in their order,
+        whose meaning is not known.
     order
-        Order in the file, as the head tells it; None if it does not.
+        Order in the file by its header; None if unknown.
     unit
-        Unit of time that the head names; None if it names none.
+        Unit of time in the header; None if it has none.
     is_named
-        Whether a head names the columns.
+        Whether a header names the columns.
     """
 
     time: int | None
@@ -85,7 +85,7 @@ class Columns:
 
     @property
     def used(self) -> tuple[int, ...]:
-        """All columns that are read: the time first, if there is one."""
+        """All used columns: the time first, if there is one."""
         time = () if self.time is None else (self.time,)
         return (*time, *self.matrix, *self.position, *self.quaternion)
 
@@ -134,7 +134,7 @@ def columns_by_names(head: Head, n: int) -> Columns | None:
 
 
 def columns_by_content(sample: FloatArray) -> Columns | None:
-    """Find the columns of a table without a head.
+    """Find the columns of a table without a header.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _expanded(names: Sequence[Name]) -> list[Name]:
 
 
 def _role(name: str) -> str | None:
-    """Which part of a pose a name stands for; of several times the one that sorts first is it."""
+    """Return the part of a pose with this name; of several times the first by order is used."""
     text = name.lower().removesuffix("_s").removesuffix("_sec")
     tokens = [token for token in re.split(r"[^a-z0-9]+", text) if token]
     if not tokens:
@@ -220,7 +220,7 @@ def _role(name: str) -> str | None:
 
 
 def _time_unit(name: Name) -> TimeUnit | None:
-    """Unit in the name of a time, but for seconds: ``timestamp(s)`` may be several stamps."""
+    """Return the unit in a time's name, except s: ``timestamp(s)`` may mean several."""
     tokens = re.split(r"[^a-z0-9]+", name.text.lower())
     for text in (name.unit, tokens[-1]):
         unit = _TIME_UNITS.get(text, text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading trajectories as data sets and other programs write them."""
+"""Reading of trajectories in the formats of data sets and other programs."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from orbslam2py.trajectory.writers import TrajectoryFormat
 
 @dataclass(frozen=True)
 class Reading:
-    """How the numbers of a trajectory file were understood.
+    """The conventions of the numbers in a trajectory file.
 
     Attributes
     ----------
     quaternions
-        Order of the quaternions; None for matrices, and for poses of no file.
+        Order of the quaternions; None for matrices, and for poses without a file.
     order_is_known
-        Whether the order was given, or stands in the head of the file.
+        Whether the order was given, or is in the header of the file.
     inverse
-        Whether the file holds poses of the world in the camera, which were inverted.
+        Whether the file has poses of the world in the camera, which were inverted.
     unit
         Unit of the times in the file; None if it has none.
     is_file
-        Whether the poses are those of a file, so that they may be read otherwise.
+        Whether the poses are from a file, so that another reading is possible.
     notes
-        What was found in the file that is not plain TUM, KITTI or EuRoC, for people.
+        Differences of the file from plain TUM, KITTI or EuRoC, for messages.
     """
 
     quaternions: QuaternionOrder | None = None
@@ -55,7 +55,7 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryFile:
-    """A trajectory, and how its file was understood.
+    """A trajectory, and the conventions of its file.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class TrajectoryFile:
     file_format
         What the file is.
     reading
-        How its numbers were understood.
+        The conventions of its numbers.
     """
 
     trajectory: Trajectory
@@ -75,7 +75,7 @@ class TrajectoryFile:
 def read_tum(path: str | Path) -> Trajectory:
     """Read ``time tx ty tz qx qy qz qw`` lines; ``#`` starts a comment.
 
-    Separators, heads, further columns and units of time are as in `read_trajectory`.
+    Separators, headers, further columns and units of time are as in `read_trajectory`.
 
     Returns
     -------
@@ -98,13 +98,12 @@ def read_kitti(path: str | Path, timestamps: FloatArray | None = None) -> Trajec
     path
         The file.
     timestamps
-        Times of the frames [s] from ``times.txt``; without, the number of the frame stands for
-        the time.
+        Times of the frames [s] from ``times.txt``; without it, the time is the number of the frame.
 
     Raises
     ------
     DatasetError
-        Naming file and line; also if there are more poses than time stamps.
+        The message names file and line; also if there are more poses than time stamps.
     """
     trajectory = _read(path, TrajectoryFormat.KITTI).trajectory
     n = len(trajectory)
@@ -149,7 +148,8 @@ def read_trajectory(
     Returns
     -------
     Trajectory
-        With the number of the frame as time for KITTI, and body poses for EuRoC.
+        Trajectory; its times are numbers of frames for KITTI, and its poses those of the body for
+        EuRoC.
     TrajectoryFormat
         What the file is.
 
@@ -169,21 +169,21 @@ def read_trajectory_file(
     quaternions: QuaternionOrder | str | None = None,
     inverse: bool = False,
 ) -> TrajectoryFile:
-    """Read a trajectory in any of the layouts of `TRAJECTORY_LAYOUTS`, and say how.
+    """Read a trajectory in any of the layouts of `TRAJECTORY_LAYOUTS`, with its conventions.
 
-    Blanks, tabs, commas or semicolons separate. A head of names tells the order of the columns.
-    Times are in s, ms, us or ns, whichever their size shows.
+    Separators are spaces, tabs, commas or semicolons. A header gives the order of the columns.
+    Times are in s, ms, us or ns, depending on their size.
 
     Parameters
     ----------
     path
         The file.
     file_format
-        What it is; by default recognised by its content.
+        The format; by default recognised by the content.
     quaternions
-        Order of the quaternions; by default that of the head, or of the format.
+        Order of the quaternions; by default that of the header, or of the format.
     inverse
-        The file holds poses of the world in the camera, ``T_cw``.
+        Whether the file has poses of the world in the camera, ``T_cw``.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def _read(
 
 
 def _format_of(table: TextTable, columns: Columns, unit: TimeUnit | None) -> TrajectoryFormat:
-    """Whether a file is EuRoC's: times in ns with commas or a head, and w first."""
+    """Return whether a file is EuRoC's: times in ns with commas or a header, and w first."""
     if columns.time is None:
         return TrajectoryFormat.KITTI
     in_ns = unit is TimeUnit.NANOSECONDS and (table.has_commas or columns.is_named)
@@ -254,7 +254,7 @@ def _usual_order(file_format: TrajectoryFormat) -> QuaternionOrder:
 def _xyzw(
     values: FloatArray, columns: Columns, order: QuaternionOrder, *, is_given: bool
 ) -> FloatArray:
-    """Bring quaternions (n, 4) into the order x, y, z, w."""
+    """Convert quaternions (n, 4) to the order x, y, z, w."""
     if columns.order is not None:
         if not is_given:
             return values  # the head names each

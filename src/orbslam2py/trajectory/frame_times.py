@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When the frames of a sequence were taken: lists of times, and the frames of a run."""
+"""Times of the frames of a sequence: lists of times, and the frames of a run."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class FrameTable:
 
 
 def is_frame_table(path: Path) -> bool:
-    """Whether a file is the table of a run's frames, and none of another program."""
+    """Return whether a file is the table of a run's frames."""
     beginning = ",".join(FRAME_COLUMNS).encode()
     try:
         with path.open("rb") as file:
@@ -65,7 +65,7 @@ def read_frame_table(path: str | Path) -> FrameTable:
     Raises
     ------
     DatasetError
-        If the file cannot be read, or is not one of these: naming the line.
+        If the file cannot be read, or is no such table; the message names the line.
     """
     rows = []
     try:
@@ -93,14 +93,13 @@ def read_frame_table(path: str | Path) -> FrameTable:
 
 
 def in_seconds(texts: Sequence[str]) -> list[str]:
-    """Write whole nanoseconds as decimal seconds, with all their digits; others stay as they are.
+    """Write whole nanoseconds as decimal seconds, with all their digits; others do not change.
 
     Parameters
     ----------
     texts
-        The times of a list, finite numbers. They are taken for nanoseconds if all are whole and
-        make no sense as seconds: more than a day from one to the next, or as large as nanoseconds
-        since 1970 are.
+        Return the times of a list, finite numbers. They count as nanoseconds if all are whole and
+        impossible as seconds: steps of more than a day, or as large as nanoseconds since 1970.
     """
     if not all(text.isdecimal() for text in texts):
         return list(texts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The layouts of trajectory files that are read, with an example of each."""
+"""The layouts of trajectory files that can be read, with examples."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class TrajectoryLayout:
     written_by
         Data sets and programs that write it.
     description
-        What is special about it.
+        Its special features.
     example
-        The first lines of a file; all examples hold the pose 1, 2, 3 with a turn of a quarter
-        around z.
+        The first lines of a file; all examples contain the pose 1, 2, 3 with a rotation of 90
+        degrees about z.
     file_format
-        The format as which it is read.
+        The format for its reading.
     """
 
     name: str

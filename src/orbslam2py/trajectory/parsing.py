@@ -30,12 +30,12 @@ REMEDY = (
 
 
 def columns_of(table: TextTable, file_format: TrajectoryFormat) -> Columns:
-    """Find the columns: by the head, by the content, or as the format that was given has them.
+    """Find the columns: by the header, by the content, or by the given format.
 
     Raises
     ------
     DatasetError
-        Naming file and line, if there are no columns of poses.
+        The message names file and line, if there are no columns of poses.
     """
     first = table.rows[0]
     n = len(first.fields)
@@ -64,7 +64,7 @@ def columns_of(table: TextTable, file_format: TrajectoryFormat) -> Columns:
 
 
 def no_trajectory(table: TextTable) -> DatasetError:
-    """Say what the first line of a file holds that is no trajectory."""
+    """Return what the first line of a file is, if it is no trajectory."""
     head = next((head for head in table.heads if not head.is_comment), None)
     row = table.rows[0] if table.rows else None
     if head is not None and not (row and any(is_number(field) for field in row.fields)):
@@ -93,7 +93,7 @@ def _columns_of_kitti(table: TextTable, n: int) -> Columns:
 
 
 def _sample(table: TextTable, n: int) -> FloatArray:
-    """Some rows from all over the table, (m, n); NaN for what is no number."""
+    """Return some rows, distributed over the table, (m, n); NaN for fields that are no numbers."""
     step = math.ceil(len(table.rows) / _SAMPLE)
     rows = [line.fields for line in table.rows[::step] if len(line.fields) == n]
     return np.array(
@@ -102,13 +102,13 @@ def _sample(table: TextTable, n: int) -> FloatArray:
 
 
 def numbers_in(table: TextTable, columns: Columns) -> FloatArray:
-    """Convert the columns that are used, float64 (n, k), k as many as `Columns.used`.
+    """Convert the used columns, float64 (n, k), k as many as `Columns.used`.
 
     Raises
     ------
     DatasetError
-        Naming file and line of a field that is no finite number, and of a line with more or fewer
-        fields than the first.
+        The message names file and line of a field that is no finite number, or of a line with
+        another number of fields than the first.
     """
     n = len(table.rows[0].fields)
     fewest = max(columns.used) + 1
@@ -137,7 +137,7 @@ def _name_the_field(table: TextTable, line: TextLine, used: Sequence[int]) -> No
 
 
 def shortened(text: str) -> str:
-    """Quote a line for a message: its beginning, without what cannot be printed."""
+    """Quote a line for a message: its beginning, without unprintable characters."""
     shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
     return "".join(
         letter if letter.isprintable() and letter != "\ufffd" else "?" for letter in shown

@@ -79,7 +79,7 @@ def rotation_angles(R: FloatArray) -> FloatArray:
 
 
 def poses_from(R: FloatArray, t: FloatArray) -> FloatArray:
-    """Put rotations (n, 3, 3) and translations (n, 3) together as transforms (n, 4, 4)."""
+    """Combine rotations (n, 3, 3) and translations (n, 3) to transforms (n, 4, 4)."""
     T = np.zeros((len(R), 4, 4))
     T[:, :3, :3] = R
     T[:, :3, 3] = t
@@ -88,21 +88,21 @@ def poses_from(R: FloatArray, t: FloatArray) -> FloatArray:
 
 
 def require_poses(T_wc: FloatArray, which: NDArray[np.bool_], what: str) -> None:
-    """See that transforms are poses, as a file or a comparison needs them.
+    """Check that transforms are poses, for a file or a comparison.
 
     Parameters
     ----------
     T_wc
         Transforms (n, 4, 4).
     which
-        Those that are needed, bool (n,).
+        Mask of the checked ones, bool (n,).
     what
-        Whose they are, for the message.
+        Their owner, for the message.
 
     Raises
     ------
     DatasetError
-        With the number of the first that is none: not finite, or without a rotation.
+        With the number of the first invalid one: not finite, or without a rotation.
     """
     bad = np.flatnonzero(which & ~are_poses(T_wc))
     if not len(bad):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Transforms between worlds of different units, and how they are found."""
+"""Transforms between worlds of different units, and their estimation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Similarity:
     scale
         Ratio of lengths, above 0.
     R
-        Rotation, float64 (3, 3); made orthonormal if it has been rounded.
+        Rotation, float64 (3, 3); made orthonormal if it was rounded.
     t
         Translation, float64 (3,).
 
@@ -66,11 +66,11 @@ class Similarity:
 
     @classmethod
     def identity(cls) -> Similarity:
-        """Make the transform that changes nothing."""
+        """Return the identity."""
         return cls(1.0, np.eye(3), np.zeros(3))
 
     def inverse(self) -> Similarity:
-        """Make the transform that undoes this one."""
+        """Return the inverse transform."""
         return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
 
     def apply(self, points: FloatArray) -> FloatArray:
@@ -79,7 +79,7 @@ class Similarity:
         return moved
 
     def apply_to_poses(self, T_wc: FloatArray) -> FloatArray:
-        """Transform poses (n, 4, 4), camera to world: positions as points, orientations turned."""
+        """Transform poses (n, 4, 4), camera to world: positions as points, and orientations."""
         moved: FloatArray = T_wc.copy()
         moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
         moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
@@ -93,19 +93,19 @@ def align(
     with_scale: bool = False,
     on_a_line: bool | None = None,
 ) -> Similarity:
-    """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
+    """Estimate the transform from points to their targets by least squares (Umeyama, PAMI 1991).
 
     Parameters
     ----------
     points, targets
         float64 (n, 3), at least one.
     with_scale
-        Whether lengths may change. They do not if one of the sets is a single place, where no
-        scale can be seen.
+        Whether lengths may change. They do not if all points of a set are at one position, because
+        the scale is unknown then.
     on_a_line
-        Whether one of the sets is taken for a straight line, around which no turn can be seen; by
-        default if it is one, but for rounding. Then only the line is turned, and nothing around it;
-        of a single place nothing is turned at all.
+        Whether one of the sets counts as a straight line, about which the rotation is unknown; by
+        default if it is one up to rounding. Then the smallest rotation of the line is used; for a
+        single position there is no rotation.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def align(
 
 
 def _least_rotation(direction: FloatArray, target: FloatArray) -> FloatArray:
-    """Rotation (3, 3) that takes one unit vector to another by the smallest turn."""
+    """Return the smallest rotation (3, 3) from one unit vector to another."""
     cosine = float(direction @ target)
     if cosine < -1 + 1e-9:
         # Half a turn, around any axis across: the one nearest to an axis of the world.

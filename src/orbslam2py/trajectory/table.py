@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Text tables of numbers as programs write them: any separator, comments, a head of names."""
+"""Text tables of numbers of any program: any separator, comments, a header."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _UNIT = re.compile(r"[\[(]\s*([a-zA-Z]*)[^\])]*[\])]")
 
 @dataclass(frozen=True)
 class Name:
-    """A name in the head of a table: ``timestamp [ns]`` is ``timestamp`` with the unit ``ns``."""
+    """A name in the header of a table: ``timestamp [ns]`` is ``timestamp`` with the unit ``ns``."""
 
     text: str
     unit: str
@@ -33,11 +33,11 @@ class Head:
     Attributes
     ----------
     number
-        Of the line, from 1.
+        Number of the line, from 1.
     names
         One per column.
     is_comment
-        Whether the line begins with ``#``, ``%`` or ``//``: it may then be prose as well.
+        Whether the line begins with ``#``, ``%`` or ``//``: it may then be prose.
     """
 
     number: int
@@ -54,7 +54,7 @@ class TextTable:
     path
         The file, for messages.
     rows
-        Their fields; of each row as many as it has.
+        Their fields; the number may differ from row to row.
     heads
         Lines above the rows that may be names of the columns, the nearest first.
     has_commas
@@ -68,11 +68,11 @@ class TextTable:
 
 
 def read_table(path: str | Path) -> TextTable:
-    """Split a text table into rows and fields; blanks, tabs, commas and semicolons separate.
+    """Split a text table into rows and fields; separators are spaces, tabs, commas and semicolons.
 
     Lines that begin with ``#``, ``%`` or ``//`` are comments. A first line without a number is a
-    head. Separators at the end of a line are left out. A comma is a decimal sign where semicolons
-    or blanks separate.
+    header. Separators at the end of a line are ignored. A comma is a decimal sign if semicolons or
+    spaces are the separators.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def read_table(path: str | Path) -> TextTable:
 
 
 def _splitter(sample: str) -> tuple[Callable[[str], list[str]], bool]:
-    """How to split lines like a sample, and whether commas separate."""
+    """Return how to split lines like a sample, and whether commas are the separators."""
     if ";" in sample:
         if "," in sample:
             return lambda line: line.replace(",", ".").split(";"), False
@@ -130,7 +130,7 @@ def _has_number(line: str) -> bool:
 
 
 def is_number(text: str) -> bool:
-    """Whether Python reads a text as a number, also as one that is not finite."""
+    """Return whether Python reads a text as a number, also as one that is not finite."""
     try:
         float(text)
     except ValueError:

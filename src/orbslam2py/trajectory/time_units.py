@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The unit in which a file of another program counts time."""
+"""The unit of time in a file of another program."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TimeUnit(str, Enum):
 
     @property
     def per_second(self) -> int:
-        """How many of them are a second."""
+        """Number of them in a second."""
         return {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[self.value]
 
     def __str__(self) -> str:
@@ -50,19 +50,19 @@ _BELIEVED = {
 
 
 def unit_by_digits(times: FloatArray, named: TimeUnit | None = None) -> TimeUnit:
-    """Tell the unit of times by their size and by the step between them.
+    """Return the unit of times by their size and by the step between them.
 
     Parameters
     ----------
     times
-        As they stand in the file, float64 (n,).
+        Times in the file, float64 (n,).
     named
-        The unit that the head of the file names. A time since 1970 goes before it.
+        The unit in the header of the file. A time since 1970 takes precedence over it.
 
     Returns
     -------
     TimeUnit
-        Seconds where nothing else is clear.
+        The unit; seconds in doubt.
     """
     largest = float(np.abs(times).max(initial=0.0))
     step = _usual_step(times)
@@ -80,24 +80,24 @@ def unit_by_digits(times: FloatArray, named: TimeUnit | None = None) -> TimeUnit
 
 
 def unit_by_other(seconds: FloatArray, unit: TimeUnit, other: FloatArray) -> TimeUnit:
-    """Tell the unit of times by another path of the same recording.
+    """Return the unit of times by another trajectory of the same recording.
 
-    Another unit is only taken if the times make no sense as they were read: they have nothing in
-    common with the others, or their steps are too long for a path and they have little in common.
+    Another unit is used only if the times are implausible as read: they do not overlap with the
+    others, or their steps are too long for a trajectory and they overlap little.
 
     Parameters
     ----------
     seconds
-        Times as they were read [s], float64 (n,).
+        Times as read [s], float64 (n,).
     unit
-        The unit as which they were read.
+        The unit as read.
     other
-        Times of the other path [s], float64 (m,).
+        Times of the other trajectory [s], float64 (m,).
 
     Returns
     -------
     TimeUnit
-        `unit` itself if no other one brings both paths together.
+        `unit` itself if no other unit makes both overlap.
     """
     if not len(seconds) or not len(other):
         return unit
@@ -124,7 +124,7 @@ def _usual_step(times: FloatArray) -> float:
 
 
 def _common_share(first: FloatArray, second: FloatArray) -> float:
-    """Length of the time that both cover, by the time that one of them covers; 0 to 1."""
+    """Return the length of the common time, relative to the shorter of both; 0 to 1."""
     begin, end = max(first.min(), second.min()), min(first.max(), second.max())
     whole = max(first.max(), second.max()) - min(first.min(), second.min())
     if end < begin:

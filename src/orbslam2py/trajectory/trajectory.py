@@ -22,10 +22,9 @@ _LARGEST_INDEX = 2.0**63
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(EqualByValue, MadeAgainByCopies):
-    """Poses of a camera over time; two are equal if all their arrays are, number by number.
+    """Poses of a camera over time; two are equal if all their arrays are equal.
 
-    The arrays are copies of those that were given, and read-only; ``trajectory.T_wc.copy()`` may be
-    changed.
+    The arrays are read-only copies; ``trajectory.T_wc.copy()`` may be changed.
 
     Attributes
     ----------
@@ -36,14 +35,14 @@ class Trajectory(EqualByValue, MadeAgainByCopies):
     lost
         Which poses only repeat an earlier one because tracking was lost, bool (n,).
     indices
-        Frame that each pose belongs to, int64 (n,): its place, from 0, among the frames that were
-        fed; 0, 1, ... if nothing else is said.
+        Number of each pose's frame, int64 (n,): its position, from 0, among the input frames; by
+        default 0, 1, ...
 
     Raises
     ------
     DatasetError
-        If one of them is no array of numbers, a time stamp is not finite, indices are no whole
-        numbers, or they differ in length.
+        If an argument is no array of numbers, a time stamp is not finite, indices are no whole
+        numbers, or lengths differ.
     """
 
     timestamps: FloatArray
@@ -101,7 +100,7 @@ class Trajectory(EqualByValue, MadeAgainByCopies):
         Raises
         ------
         DatasetError
-            If it is none of these, or does not fit.
+            If it is none of these, or has another length.
         """
         if not isinstance(which, slice):
             which = _selection(which, len(self))
@@ -115,24 +114,24 @@ class Trajectory(EqualByValue, MadeAgainByCopies):
         return Trajectory(self.timestamps + seconds, self.T_wc, self.lost, self.indices)
 
     def save(self, path: str | Path, format: TrajectoryFormat | str = TrajectoryFormat.TUM) -> None:  # noqa: A002
-        """Write the poses into a file.
+        """Write the poses to a file.
 
         Parameters
         ----------
         path
-            The file; replaced only when everything was written.
+            The file; replaced only after everything is written.
         format
             ``"tum"``: time, position and quaternion of every pose that is not lost. ``"kitti"``:
             the upper three rows of ``T_wc``, one line per frame; the identity before the first
-            pose, and the pose before where there is none.
+            pose, and the previous pose for frames without one.
 
         Raises
         ------
         OSError
             If the file cannot be written; an existing file is kept then.
         DatasetError
-            For another format, frame numbers that do not increase (``"kitti"``), or poses that are
-            none: not finite, or without a rotation.
+            For another format, frame numbers that do not increase (``"kitti"``), or invalid poses:
+            not finite, or without a rotation.
         """
         chosen = TrajectoryFormat.of(format)
         if chosen is TrajectoryFormat.TUM:
@@ -144,7 +143,7 @@ class Trajectory(EqualByValue, MadeAgainByCopies):
 
 
 def lengths_along(positions: FloatArray) -> FloatArray:
-    """Measure a path: how far it is from its start to each of its positions.
+    """Measure a path: return the distance along it from its start to each position.
 
     Parameters
     ----------

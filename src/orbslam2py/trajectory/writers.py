@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Formats of trajectory files, and writing them.
 
-Apart from reading, so that a `Trajectory` can save itself.
+Separate from reading, so that a `Trajectory` can save itself.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from orbslam2py.trajectory.rotations import quaternions_from_rotations, require_
 
 
 class TimedPoses(Protocol):
-    """What is written of an `orbslam2py.Trajectory`; see its attributes."""
+    """The parts of an `orbslam2py.Trajectory` that are written; see its attributes."""
 
     @property
     def timestamps(self) -> FloatArray: ...  # noqa: D102
@@ -48,7 +48,7 @@ class TrajectoryFormat(str, Enum):
     """Formats of trajectory files."""
 
     AUTO = "auto"
-    """Whichever the content of the file shows."""
+    """Recognised by the content of the file."""
     TUM = "tum"
     """``time tx ty tz qx qy qz qw``, camera to world."""
     KITTI = "kitti"
@@ -63,7 +63,7 @@ class TrajectoryFormat(str, Enum):
         Raises
         ------
         DatasetError
-            Listing the names, if there is none like that.
+            For an unknown name; the message lists the names.
         """
         return member_of(cls, value, "the format of the trajectory")
 
@@ -79,18 +79,19 @@ def write_tum(
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     trajectory
         Poses; positions and quaternions (camera to world) get 9 decimals.
     timestamp_texts
-        The source's text of every time stamp, so that no digit is lost; 6 decimals without.
+        The source's text of every time stamp, so that no digit is lost; None: 6 decimals.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     DatasetError
-        If there is not one text per pose, or a pose is none: not finite, or without a rotation.
+        If the number of texts differs from that of poses, or a pose is invalid: not finite, or
+        without a rotation.
     """
     _check(trajectory)
     require_poses(trajectory.T_wc, ~trajectory.lost, "the trajectory")
@@ -109,13 +110,13 @@ def write_tum(
 def write_kitti(path: str | Path, trajectory: TimedPoses, n_frames: int | None = None) -> None:
     """Write 12 numbers per input frame: the upper three rows of ``T_wc``.
 
-    KITTI's tools want one line for each frame, so the frames before the first pose get the
-    identity and later ones without a pose repeat the one before.
+    KITTI's tools need one line for each frame: the frames before the first pose get the identity,
+    and later ones without a pose repeat the one before.
 
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     trajectory
         Poses with the numbers of their frames in `Trajectory.indices`.
     n_frames
@@ -126,8 +127,8 @@ def write_kitti(path: str | Path, trajectory: TimedPoses, n_frames: int | None =
     OSError
         If the file cannot be written.
     DatasetError
-        If the indices are not increasing or lie beyond `n_frames`, or a pose is none: not finite,
-        or without a rotation.
+        If the indices do not increase or exceed `n_frames`, or a pose is invalid: not finite, or
+        without a rotation.
     """
     _check(trajectory)
     require_poses(trajectory.T_wc, np.ones(len(trajectory), bool), "the trajectory")
@@ -154,25 +155,26 @@ def write_euroc(
 ) -> None:
     """Write ``ns, px, py, pz, qw, qx, qy, qz`` for every pose that is not lost, below a header.
 
-    The layout of EuRoC's ``data.csv`` (Burri et al., IJRR 2016); its tools take the poses for those
-    of the body, so multiply `T_wc` by the inverse of ``T_BS`` first if that is what they compare.
+    The layout of EuRoC's ``data.csv`` (Burri et al., IJRR 2016). Its tools expect poses of the
+    body: to compare these, first multiply `T_wc` by the inverse of ``T_BS``.
 
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     trajectory
         Poses; positions and quaternions get 9 decimals.
     timestamp_texts
         The source's text of every time stamp in decimal seconds, so that no nanosecond is lost;
-        rounded to microseconds without.
+        None: rounded to microseconds.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     DatasetError
-        If there is not one text per pose, or a pose is none: not finite, or without a rotation.
+        If the number of texts differs from that of poses, or a pose is invalid: not finite, or
+        without a rotation.
     """
     _check(trajectory)
     require_poses(trajectory.T_wc, ~trajectory.lost, "the trajectory")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person watches: the map while it grows, or that of a run long past."""
+"""The viewer: the growing map of a running system, or that of a finished run."""
 
 from orbslam2py.viewer.live import LiveView, Viewer
 from orbslam2py.viewer.publisher import Publisher

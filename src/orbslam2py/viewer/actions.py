@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the buttons of the page do to a system."""
+"""Actions of the page's buttons on a system."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class ActionsOnSystem:
-    """Does to a system what a person asks for, and says in a sentence what came of it.
+    """Performs the user's requests on a system, and returns a message about each.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ActionsOnSystem:
         return "A new map begins with the next image."
 
     def optimize(self) -> str | None:
-        """Refine the whole map; returns when it is done."""
+        """Run full bundle adjustment of the whole map; returns at its end."""
         try:
             record = self._system.optimize()
         except OrbSlamError as error:
@@ -53,7 +53,7 @@ class ActionsOnSystem:
         return f"Optimized: {record.n_keyframes} keyframes, {record.n_points} points."
 
     def save(self) -> str | None:
-        """Write the map into a new file."""
+        """Write the map to a new file."""
         path = self._folder / time.strftime("map-%Y%m%d-%H%M%S.orbmap")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -63,7 +63,7 @@ class ActionsOnSystem:
         return f"The map is in {path}."
 
     def neighbours(self, keyframe: int) -> Neighbours:
-        """Keyframes that share points with one, and how many, most first."""
+        """Return keyframes that share points with one, and the numbers of points, largest first."""
         slam_map = self._system.pipeline.back_end.map
         try:
             found = [int(i) for i in slam_map.neighbours(keyframe)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Switches and buttons of the page, and what they ask for."""
+"""Switches and buttons of the page, and their requests."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _COLOURS: dict[str, Colour] = {
 
 
 class SystemActions(Protocol):
-    """What a person may ask of a system. Each returns a message for the page, or None."""
+    """Requests of the user to a system. Each returns a message for the page, or None."""
 
     def set_localization(self, wanted: bool) -> str | None:
         """Switch localization mode."""
@@ -43,16 +43,16 @@ class SystemActions(Protocol):
         ...
 
     def optimize(self) -> str | None:
-        """Refine the whole map, now."""
+        """Run full bundle adjustment of the whole map now."""
         ...
 
     def save(self) -> str | None:
-        """Write the map into a file."""
+        """Write the map to a file."""
         ...
 
 
 class RunActions(Protocol):
-    """What a person may ask of a run; as `orbslam2py.runs.RunControl`."""
+    """Requests of the user to a run; as `orbslam2py.runs.RunControl`."""
 
     @property
     def paused(self) -> bool:
@@ -73,7 +73,7 @@ class RunActions(Protocol):
 
 
 class ViewActions(Protocol):
-    """What a person may ask of the picture."""
+    """Requests of the user for the picture."""
 
     def show_layer(self, layer: str, visible: bool) -> None:
         """Show or hide a layer."""
@@ -84,11 +84,11 @@ class ViewActions(Protocol):
         ...
 
     def set_distance(self, factor: float) -> None:
-        """Follow from farther away, or nearer."""
+        """Follow from a larger or smaller distance."""
         ...
 
     def show_all(self, client: viser.ClientHandle) -> None:
-        """Let a browser see the whole map."""
+        """Show the whole map in a browser."""
         ...
 
     def set_point_size(self, factor: float) -> None:
@@ -96,12 +96,12 @@ class ViewActions(Protocol):
         ...
 
     def colour_by(self, what: ColourBy) -> None:
-        """Colour points by something else."""
+        """Choose the colours of points."""
         ...
 
 
 def add_view_controls(server: viser.ViserServer, view: ViewActions) -> None:
-    """Add what concerns the picture."""
+    """Add the controls of the picture."""
     gui = server.gui
     with gui.add_folder("View"):
         follow = gui.add_dropdown(
@@ -150,7 +150,7 @@ def _legend() -> str:
 
 
 class SystemControls:
-    """What concerns the system: mode, reset, optimize, save.
+    """Controls of the system: mode, reset, optimize, save.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class SystemControls:
         save.on_click(lambda event: _ask(event, actions.save))
 
     def show_localization(self, wanted: bool) -> None:
-        """Let the switch show what somebody else has switched."""
+        """Update the switch after a change from elsewhere."""
         switch: Any = self._localization
         if switch.value != wanted:
             switch.value = wanted
@@ -194,14 +194,14 @@ def _ask(event: viser.GuiEvent[Any], action: Callable[[], str | None]) -> None:
 
 
 class RunControls:
-    """What concerns a recorded run: pause, single steps, stop.
+    """Controls of a recorded run: pause, single steps, stop.
 
     Parameters
     ----------
     server : viser.ViserServer
         The page.
     run : RunActions, optional
-        Without one it cannot be held.
+        Without it, the run cannot be paused.
     stop : callable, optional
         Ends it.
     """
@@ -229,7 +229,7 @@ class RunControls:
             self._stop.on_click(lambda _: stop())
 
     def end(self) -> None:
-        """The run has ended: nothing can be asked any more."""
+        """Disable all requests: the run has ended."""
         for button in self._buttons:
             button.disabled = True
 

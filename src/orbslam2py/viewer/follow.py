@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The view of those who look: free, or with the camera, from behind or from above."""
+"""The view of the browsers: free, or with the camera, from behind or from above."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Follower:
     mode : Follow
         How.
     distance : float
-        From how far away, 1 as usual.
+        Distance factor, 1 by default.
     """
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class Follower:
         self._forward: FloatArray | None = None
 
     def move(self, client: viser.ClientHandle, T_wc: FloatArray, size: float) -> None:
-        """Move the view of a browser to where the camera is.
+        """Move the view of a browser to the camera.
 
         Parameters
         ----------
@@ -70,7 +70,7 @@ class Follower:
             client.camera.look_at = target
 
     def turn(self, T_wc: FloatArray) -> None:
-        """Take note of where the camera looks, once for every image."""
+        """Store the viewing direction of the camera, once for every image."""
         forward = T_wc[:3, 2]
         before = forward if self._forward is None else self._forward
         mixed = (1 - _TURN) * before + _TURN * forward
@@ -78,7 +78,7 @@ class Follower:
         self._forward = mixed / length if length > 0.1 else forward
 
     def _view(self, T_wc: FloatArray, size: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Where the eye is, what it looks at, what is up."""
+        """Return position of the eye, target, and up direction."""
         place = T_wc[:3, 3]
         if self.mode is Follow.ABOVE:
             # Not quite from above, where left and right would have no meaning.
@@ -92,9 +92,9 @@ class Follower:
 def whole_view(
     points: FloatArray, beside: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """From where all of the map is seen: eye and target, from points (n, 3) of it.
+    """Return a view of the whole map: eye and target, from its points (n, 3).
 
-    What lies beside it (m, 3) is seen as well.
+    Further points (m, 3) are also visible.
     """
     low, high = np.percentile(points, [2, 98], axis=0)
     if beside is not None and len(beside):

@@ -47,7 +47,7 @@ def orientations(T_wc: FloatArray) -> FloatArray:
 
 
 def nearest_to_ray(places: FloatArray, origin: FloatArray, direction: FloatArray) -> int | None:
-    """Row of the place that a ray passes at the smallest angle, in front of its origin."""
+    """Return the row of the position with the smallest angle to a ray, in front of its origin."""
     if not len(places):
         return None
     away = places - origin

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map of a run long past, as far as it had come at a time."""
+"""The map of a finished run up to a time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from orbslam2py.viewer.map_model import MapModel
 
 
 def changes_until(arrays: MapArrays, model: MapModel, now: float) -> MapChanges:
-    """What turns a map that is shown into the last one as far as it was seen until a time."""
+    """Return the changes from the shown map to the final one, as far as seen until a time."""
     there = arrays.keyframe_timestamps <= now + 1e-6
     ids = arrays.keyframe_ids[there]
     new = np.flatnonzero(there & ~np.isin(arrays.keyframe_ids, model.keyframe_ids))

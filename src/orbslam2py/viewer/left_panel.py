@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The image side of the page: what the camera sees, how it goes, a keyframe that was chosen."""
+"""The image side of the page: the image, the state, a selected keyframe."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _DIAMOND_RIM = _OFFSETS[(_AROUND == 6) | (_AROUND == 3)]
 
 
 def overlaid(view: FrameView) -> ByteArray:
-    """The image with its keypoints, as it is sent, red, green, blue.
+    """Return the image with its keypoints for sending, red, green, blue.
 
-    Drawn ten times a second beside tracking, so by whole arrays and without smooth edges, in a
-    tenth of the time that `orbslam2py.pictures.draw_overlay` takes.
+    It is drawn ten times a second during tracking, by array operations and without anti-aliasing,
+    in a tenth of the time of `orbslam2py.pictures.draw_overlay`.
     """
     height, width = view.image.shape[:2]
     size = fit_size((width, height), _ROOM)
@@ -65,7 +65,7 @@ def overlaid(view: FrameView) -> ByteArray:
 def _stamp(
     picture: ByteArray, places: npt.NDArray[np.int64], shape: npt.NDArray[np.int64], colour: Colour
 ) -> None:
-    """Colour the pixels of a shape (s, 2) around each of the places (n, 2), x and y."""
+    """Colour the pixels of a shape (s, 2) around each of the positions (n, 2), x and y."""
     height, width = picture.shape[:2]
     columns = (places[:, :1] + shape[:, 0]).ravel()
     rows = (places[:, 1:] + shape[:, 1]).ravel()
@@ -74,7 +74,7 @@ def _stamp(
 
 
 def status_of(view: FrameView, n_keyframes: int, n_points: int, n_dropped: int) -> Status:
-    """What the line below the image says."""
+    """Return the text of the status line."""
     queue, record = view.queue, view.record
     return Status(
         state=record.state,
@@ -116,15 +116,15 @@ class LeftPanel:
         panel.expand()  # on a telephone it is a section of the sheet below, closed by itself
 
     def show_image(self, picture: ByteArray) -> None:
-        """Show what the camera sees, red, green, blue."""
+        """Show the camera image, red, green, blue."""
         self._image.image = picture
 
     def show_status(self, status: Status | None, note: str = "") -> None:
-        """Say how it goes, and one more thing."""
+        """Show the state, and one further text."""
         self._status.content = _status_html(status, note)
 
     def show_keyframe(self, lines: list[str], picture: KeyframePicture | None) -> None:
-        """Show what is known of a keyframe."""
+        """Show the data of a keyframe."""
         self._keyframe_text.content = _text("\n".join(lines))
         self._keyframe_image.visible = picture is not None
         if picture is not None:
@@ -132,7 +132,7 @@ class LeftPanel:
 
 
 def thumbnail(picture: ByteArray, width: int = 200) -> ByteArray:
-    """A small one, for the image plane of the camera."""
+    """A small image, for the image plane of the camera."""
     size = (width, max(1, round(picture.shape[0] * width / picture.shape[1])))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The live viewer: a page in the browser that shows a system while it works.
 
-What is drawn and served is drawn in a process of its own (`orbslam2py.viewer.process`): tracking
-hands over plain data ten times a second.
+Drawing and serving happen in a separate process (`orbslam2py.viewer.process`): tracking sends plain
+data ten times a second.
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ FRAME_RATE = 10.0
 
 
 class LiveView:
-    """A watcher that shows the run in a page, which a process of its own serves.
+    """A watcher that shows the run in a page of a separate process.
 
-    That process has a low priority, is not reached by Ctrl-C, and ends with this one. If it is the
-    first to end, the run goes on without it.
+    This process has a low priority, ignores Ctrl-C, and ends with the main process. If it ends
+    first, the run continues without it.
 
     Parameters
     ----------
     host : str
-        Where the page is served; by default only this computer is.
+        Address of the page; by default only for this computer.
     port : int, optional
         The port, which must be free; by default 8080 or the next free one.
     title : str
         What is seen, for the head of the page.
     stand_back : bool
-        Take only time that nobody else wants, where the system knows such a thing (Linux): for
-        images that come in real time. Where all cores are at work, little is seen.
+        Use only idle time of the processor, if the system supports this (Linux): for images in real
+        time. If all cores are busy, little is shown.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class LiveView:
 
     @property
     def address(self) -> str:
-        """What a person types into a browser."""
+        """Address of the page for a browser."""
         return self._companion.address
 
     @property
@@ -114,16 +114,16 @@ class LiveView:
         stop: Callable[[], None] | None = None,
         folder: str | Path = ".",
     ) -> None:
-        """Say whose page it is.
+        """Send the description of the system.
 
         Parameters
         ----------
         system : System
             What the buttons ask.
         truth : Trajectory, optional
-            The true path, which is laid over the estimated one.
+            Ground truth, drawn with the estimated trajectory.
         control : RunActions, optional
-            What can hold the run, if it is recorded.
+            Control that can pause the run, if it is recorded.
         stop : callable, optional
             What ends the run.
         folder : path
@@ -132,7 +132,7 @@ class LiveView:
         Raises
         ------
         StateError
-            If `system` is none, or `truth` no trajectory.
+            If `system` is no `System`, or `truth` no trajectory.
         """
         _require_system(system)
         if truth is not None:
@@ -165,7 +165,7 @@ class LiveView:
 
     # ---- as a watcher ----------------------------------------------------------------------------
     def on_frame(self, view: FrameView) -> None:
-        """Show an image, and where it was taken."""
+        """Show an image and its pose."""
         assert self._system is not None
         shown = replace(
             view,
@@ -176,15 +176,15 @@ class LiveView:
         self._show("on_frame", shown, self._system.localization_mode)
 
     def on_map(self, changes: MapChanges) -> None:
-        """Show what has become of the map."""
+        """Show the changes of the map."""
         self._show("on_map", changes)
 
     def on_resting_maps(self, maps: RestingMaps) -> None:
-        """Show the maps that rest beside the active one."""
+        """Show the inactive maps beside the active one."""
         self._show("on_resting_maps", maps)
 
     def on_event(self, event: Event) -> None:
-        """Tell that a loop was closed, or that two maps are one now."""
+        """Report a loop closure or a merge."""
         if isinstance(event, LoopClosed | MapsMerged):
             self._show("on_event", event)
 
@@ -196,22 +196,22 @@ class LiveView:
             raise
 
     def close(self) -> None:
-        """Show the last of it; the page stays."""
+        """Show the final state; the page stays open."""
         with contextlib.suppress(CompanionError):  # it was said, or is when the page is missed
             self._companion.tell("close", self._n_dropped)
 
     def tell_end(self, text: str) -> None:
-        """Say below the image that the run has ended."""
+        """Show below the image that the run has ended."""
         with contextlib.suppress(CompanionError):
             self._companion.tell("tell_end", text)
 
     def look_from(self, eye: npt.NDArray[np.float64], target: npt.NDArray[np.float64]) -> None:
-        """Let all browsers look from one place (3,) to another, world, and stay there."""
+        """Fix the view of all browsers at a position (3,), looking at another, world."""
         with contextlib.suppress(CompanionError):
             self._companion.tell("look_from", eye, target)
 
     def count_dropped(self) -> None:
-        """An image was dropped before it came to the system."""
+        """Report an image that was dropped before tracking."""
         self._n_dropped += 1
 
     def tell_latency(self, text: str) -> None:
@@ -219,7 +219,7 @@ class LiveView:
         self._latency = text
 
     def wait(self) -> None:
-        """Keep the page until Ctrl-C, or until it is no more."""
+        """Keep the page until Ctrl-C, or until it is closed."""
         with contextlib.suppress(KeyboardInterrupt):
             wait_for_event(self._companion.ended)
             if not self._missed:
@@ -230,7 +230,7 @@ class LiveView:
         self._companion.stop()
 
     def _ended(self) -> None:
-        """The page is no more: nobody can let a run go on that stands still."""
+        """Let a paused run continue: the page is closed and nobody else can."""
         # Also if the view is closed: an image that could not be shown may have been the first to
         # tell, and a run that has ended does not mind.
         if self._control is not None and self._control.paused:
@@ -249,41 +249,41 @@ class LiveView:
 
 
 def _light(record: TrackingRecord) -> TrackingRecord:
-    """A record without the keypoints, which a view holds itself."""
+    """A record without the keypoints, which the view contains itself."""
     return record if record.features is None else replace(record, features=None)
 
 
 class Viewer:
-    """Shows a system in the browser while it works.
+    """Shows a running system in the browser.
 
-    The page can be opened from this computer only, unless another host is named. It ends with the
-    block; `wait` keeps it until Ctrl-C.
+    Only this computer can open the page, unless another host is given. It ends with the block;
+    `wait` keeps it until Ctrl-C.
 
     Parameters
     ----------
     system : System
         What to show.
     host : str
-        Address of this computer to listen at. Whoever can reach it sees the images and can use the
-        buttons.
+        Address of this computer to listen at. Anybody who can reach it sees the images and can use
+        the buttons.
     port : int, optional
         The port, which must be free; by default 8080 or the next free one.
     truth : Trajectory, optional
-        The true path, which is laid over the estimated one.
+        Ground truth, drawn with the estimated trajectory.
     open_browser : bool
-        Open the page where there is a screen; its address is printed in any case.
+        Open the page if there is a screen; its address is always printed.
 
     Attributes
     ----------
     address : str
-        What a person types into a browser.
+        Address of the page for a browser.
     stopped : threading.Event
-        Set when somebody presses Stop: look at it in the loop that reads the images.
+        Set when a user presses Stop: check it in the loop that reads the images.
 
     Raises
     ------
     StateError
-        If `system` is none, viser is not installed, or the page cannot be served there.
+        If `system` is no `System`, viser is not installed, or the page cannot be served there.
 
     Examples
     --------
@@ -314,7 +314,7 @@ class Viewer:
             raise
 
     def look_from(self, eye: npt.ArrayLike, target: npt.ArrayLike) -> None:
-        """Let all browsers look from a place (3,) to another, in the world of the map."""
+        """Fix the view of all browsers at a position (3,), looking at another, world of the map."""
         self._view.look_from(np.asarray(eye, float), np.asarray(target, float))
 
     def wait(self) -> None:
@@ -345,6 +345,6 @@ def _require_system(system: object) -> None:
 
 
 def announce(address: str, *, open_browser: bool) -> None:
-    """Open the page where there is a screen, and print where it is."""
+    """Open the page if there is a screen, and print its address."""
     opened = open_browser and open_page(address)
     print(f"The viewer is at {address}" + ("" if opened else ": open it in a browser"), flush=True)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map as a viewer remembers it: pages of points, keyframes, edges, and which of them are stale.
+"""A viewer's copy of the map: pages of points, keyframes, edges, and which of them are stale.
 
-A page holds what has neighbouring ids. Mapping changes what is new, so most pages stay as they are,
-and only those that do not are sent to who looks.
+A page contains elements with neighbouring ids. Mapping changes new elements, so most pages do not
+change; only changed ones are sent to browsers.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ class PointPage:
 
 @dataclass
 class Stale:
-    """What is to be drawn again."""
+    """The parts to draw again."""
 
     everything: bool = False
-    """What was drawn before is void."""
+    """Whether earlier drawings are invalid."""
     points: set[int] = field(default_factory=set)
     """Pages of points."""
     keyframes: set[int] = field(default_factory=set)
@@ -73,7 +73,7 @@ class MapModel:
     covisibility, spanning_tree, loop_edges : array (e, 2)
         Pairs of ids of keyframes.
     stale : Stale
-        What has changed since the owner emptied it.
+        Changes since the owner last emptied it.
     """
 
     def __init__(self) -> None:
@@ -94,13 +94,13 @@ class MapModel:
         return sum(len(page.ids) for page in self.points.values())
 
     def take_stale(self) -> Stale:
-        """What has changed since the last call."""
+        """Return the changes since the last call."""
         stale, self.stale = self.stale, Stale()
         return stale
 
     # ---- changes ---------------------------------------------------------------------------------
     def apply(self, changes: MapChanges) -> None:
-        """Bring the model up to date."""
+        """Update the model."""
         if changes.restarted:
             self._clear()
             self.stale = Stale(everything=True)
@@ -129,7 +129,7 @@ class MapModel:
             self.stale.points.add(number)
 
     def _apply_keyframes(self, changes: MapChanges) -> IntArray:
-        """Ids of the keyframes that are new, moved or gone."""
+        """Return the ids of new, moved or removed keyframes."""
         new, removed = changes.keyframes_set, changes.keyframes_removed
         changed = np.union1d(new.ids, removed)
         if len(changed):
@@ -157,12 +157,12 @@ class MapModel:
 
     # ---- colours of the scene --------------------------------------------------------------------
     def colour_points(self, ids: IntArray, colours: ByteArray) -> set[int]:
-        """Remember the colours (n, 3) in which points are seen; the first one counts.
+        """Store the image colours (n, 3) of points; the first one is kept.
 
         Returns
         -------
         set of int
-            Pages of points that had none.
+            Pages of points without earlier colours.
         """
         changed: set[int] = set()
         for number in np.unique(ids // POINT_IDS).tolist():
@@ -180,7 +180,7 @@ class MapModel:
         return changed
 
     def colours_of(self, number: int, default: tuple[int, int, int]) -> ByteArray:
-        """Colours in which the points of a page were seen, (p, 3)."""
+        """Return the image colours of the points of a page, (p, 3)."""
         ids = self.points[number].ids
         colours = np.empty((len(ids), 3), np.uint8)
         colours[:] = default
@@ -192,7 +192,7 @@ class MapModel:
 
     # ---- questions -------------------------------------------------------------------------------
     def positions_of(self, ids: IntArray) -> npt.NDArray[np.float32]:
-        """Positions (n, 3) of those of the points that are known."""
+        """Return positions (n, 3) of the known ones of the points."""
         found = [np.zeros((0, 3), np.float32)]
         for number in np.unique(ids // POINT_IDS).tolist():
             page = self.points.get(number)
@@ -201,7 +201,7 @@ class MapModel:
         return np.concatenate(found)
 
     def rows_of(self, pairs: IntArray) -> IntArray:
-        """Rows (e, 2) of pairs of keyframes, of those of which both are known."""
+        """Return rows (e, 2) of pairs of keyframes, if both are known."""
         if not len(self.keyframe_ids) or not len(pairs):
             return _no_pairs()
         rows = np.searchsorted(self.keyframe_ids, pairs)
@@ -211,20 +211,20 @@ class MapModel:
         return found
 
     def rows_in_page(self, number: int) -> slice:
-        """Rows of the keyframes of a page."""
+        """Return the rows of the keyframes of a page."""
         ends = np.searchsorted(
             self.keyframe_ids, [number * KEYFRAME_IDS, (number + 1) * KEYFRAME_IDS]
         )
         return slice(int(ends[0]), int(ends[1]))
 
     def edges_in_page(self, pairs: IntArray, number: int) -> FloatArray:
-        """Ends (e, 2, 3) of the edges of a page, world."""
+        """Return the ends (e, 2, 3) of the edges of a page, world."""
         rows = self.rows_of(pairs[edge_pages(pairs) == number])
         return np.asarray(self.keyframe_T_wc[rows][:, :, :3, 3])
 
 
 def edge_pages(pairs: IntArray) -> IntArray:
-    """Which page an edge is on."""
+    """Return the page of an edge."""
     return pairs.max(axis=1) // KEYFRAME_IDS if len(pairs) else _no_ids()
 
 

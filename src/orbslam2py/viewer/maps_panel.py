@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which maps there are, in which colour, and which of them are shown."""
+"""The list of maps: colours, and which of them are shown."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NOTE = "Maps that have not met are worlds of their own: how one lies beside ano
 
 @dataclass(frozen=True)
 class MapLine:
-    """What is said of a map."""
+    """The text about a map."""
 
     number: int
     is_active: bool
@@ -34,14 +34,14 @@ class MapLine:
 
 
 class MapsPanel:
-    """A list of the maps with a switch for each; there only if there are several.
+    """A list of the maps with a switch for each; shown only if there are several.
 
     Parameters
     ----------
     server : viser.ViserServer
         The page.
     on_switch : callable
-        Called with the number of a map, and whether it is to be seen.
+        Called with the number of a map, and whether to show it.
     """
 
     def __init__(self, server: viser.ViserServer, on_switch: Callable[[int, bool], None]) -> None:
@@ -54,7 +54,7 @@ class MapsPanel:
         self._hidden: set[int] = set()
 
     def show(self, lines: list[MapLine]) -> None:
-        """Say which maps there are, the oldest first."""
+        """Show which maps exist, the oldest first."""
         several = len(lines) > 1
         if self._folder.visible != several:
             self._folder.visible = several

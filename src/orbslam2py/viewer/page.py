@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page: a scene, a panel with the image, switches; shared by all browsers that look."""
+"""The page: a scene, a panel with the image, switches; shared by all browsers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _NAMED = 12
 
 
 class Page:
-    """What browsers show, whatever it comes from.
+    """The contents of all browsers, from any source.
 
     Parameters
     ----------
@@ -45,18 +45,18 @@ class Page:
     title : str
         For its head.
     on_client : callable
-        Called when a browser has come, in a thread of its own.
+        Called for each new browser, in a separate thread.
 
     Attributes
     ----------
     lock : threading.RLock
-        To be held by whoever draws.
+        Lock that must be held for drawing.
     model : MapModel
-        The map that is shown.
+        The shown map.
     scene, resting, left
         The parts.
     neighbours : callable
-        Tells which keyframes share points with one, and how many.
+        Returns which keyframes share points with one, and how many.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Page:
 
     @property
     def is_watched(self) -> bool:
-        """Whether a browser shows it."""
+        """Return whether a browser shows it."""
         return bool(self.server.get_clients())
 
     def _connected(self, client: viser.ClientHandle) -> None:
@@ -101,12 +101,12 @@ class Page:
                 self.show_all(client)
 
     def tell(self, title: str, text: str) -> None:
-        """Say something in all browsers, for a while."""
+        """Show a message in all browsers, for some seconds."""
         for client in self.server.get_clients().values():
             client.add_notification(title, text, auto_close_seconds=8.0)
 
     def stop(self) -> None:
-        """End it; browsers say that they have lost it."""
+        """Close the page; browsers show that the connection is lost."""
         stop_server(self.server)
         with self.lock:
             self._album.close()
@@ -121,7 +121,7 @@ class Page:
             self.scene.draw_path(path, np.zeros((0, 2, 3)))
 
     def take_resting_maps(self, maps: RestingMaps) -> None:
-        """Learn which maps rest beside the active one, and what has changed in them."""
+        """Get the inactive maps and their changes."""
         self._active_map = maps.active
         self.resting.apply(maps)
         colour = map_colour(maps.active) if maps.there else KEYFRAME
@@ -143,7 +143,7 @@ class Page:
         self._maps_panel.show(sorted([*lines, own], key=lambda line: line.number))
 
     def draw_map(self, at_most: int | None = _PAGES) -> None:
-        """Draw what has changed in the map, of very much a part at a time."""
+        """Draw the changes of the map; large changes in several parts."""
         self._gather_stale()
         if self._colours.update_span():
             self._stale.points |= set(self.model.points)
@@ -173,13 +173,13 @@ class Page:
         )
 
     def colour_points(self, ids: IntArray, colours: ByteArray) -> None:
-        """Remember the colours (n, 3) in which points are seen."""
+        """Store the image colours (n, 3) of points."""
         changed = self.model.colour_points(ids, colours)
         if self._colours.by is ColourBy.IMAGE:
             self._stale.points |= changed & set(self.model.points)
 
     def fit_size(self, local_points: IntArray, T_wc: FloatArray | None) -> None:
-        """Make cameras and points as large as the distance of what is seen asks for."""
+        """Adapt the sizes of cameras and points to the distance of the view."""
         places = self.model.positions_of(local_points)
         if not len(places):  # as in the first image
             pages = self.model.points.values()
@@ -192,7 +192,7 @@ class Page:
             self._stale.keyframes |= set((self.model.keyframe_ids // KEYFRAME_IDS).tolist())
 
     def show_camera(self, T_wc: FloatArray | None, image: ByteArray | None, aspect: float) -> None:
-        """Show where the camera is, and let the views follow."""
+        """Show the pose of the camera, and let the views follow."""
         self.scene.draw_camera(T_wc, image, aspect)
         if T_wc is None:
             return
@@ -203,7 +203,7 @@ class Page:
     def keep_keyframe(
         self, keyframe: int, image: ByteArray, n_keypoints: int, n_matched: int
     ) -> None:
-        """Keep the picture of a keyframe, for who clicks it."""
+        """Store the picture of a keyframe, to be shown after a click."""
         self._album.add(keyframe, KeyframePicture(image, n_keypoints, n_matched))
 
     # ---- what a person asks for, in threads of the server ----------------------------------------
@@ -230,7 +230,7 @@ class Page:
             self._move_views()
 
     def set_distance(self, factor: float) -> None:
-        """Follow from farther away, or nearer."""
+        """Follow from a larger or smaller distance."""
         with self.lock:
             self._follower.distance = factor
             self._move_views()
@@ -241,7 +241,7 @@ class Page:
                 self._follower.move(client, self._T_wc, self.scene.size)
 
     def show_all(self, client: viser.ClientHandle) -> None:
-        """Let a browser see the whole map."""
+        """Show the whole map in a browser."""
         with self.lock:
             places = [page.positions for page in self.model.points.values() if len(page.ids)]
             if not places:
@@ -250,7 +250,7 @@ class Page:
             _look(client, *whole)
 
     def look_from(self, eye: FloatArray, target: FloatArray) -> None:
-        """Let all browsers look from one place to another, and stay there."""
+        """Move the view of all browsers to a position, looking at another, and keep it there."""
         with self.lock:
             self._follower.mode = Follow.FREE
             for client in self.server.get_clients().values():
@@ -262,7 +262,7 @@ class Page:
             self.scene.set_point_size(factor)
 
     def colour_by(self, what: ColourBy) -> None:
-        """Colour points by something else."""
+        """Choose the colours of points."""
         with self.lock:
             self._colours.by = what
             self._stale.points |= set(self.model.points)

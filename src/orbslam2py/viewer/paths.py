@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The camera's path in the world of the map: as it is now, as first tracked, and the true one."""
+"""The camera's trajectory in the world of the map: present, as tracked, and the true one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MIN_SPAN = 1e-3
 
 @dataclass
 class OnlinePath:
-    """Poses as they were when the images came, never corrected."""
+    """Poses at the time of tracking, without corrections."""
 
     _map_index: int = -1
     _positions: list[FloatArray] = field(default_factory=list)
@@ -34,7 +34,7 @@ class OnlinePath:
     _after_gap: bool = True
 
     def add(self, record: TrackingRecord) -> None:
-        """Take the pose of an image, if it has one."""
+        """Add the pose of an image, if it has one."""
         if record.map_index != self._map_index:
             self._map_index = record.map_index
             self._positions, self._gaps, self._after_gap = [], [], True
@@ -47,21 +47,21 @@ class OnlinePath:
         self._after_gap = False
 
     def lines(self) -> FloatArray:
-        """Ends of the pieces, (s, 2, 3) world."""
+        """Return the ends of the segments, (s, 2, 3) world."""
         if not self._positions:
             return np.zeros((0, 2, 3))
         return pieces(np.array(self._positions), np.array(self._gaps))
 
 
 def pieces(positions: FloatArray, after_gap: np.ndarray | None = None) -> FloatArray:
-    """Cut a path into pieces between its corners, thinned where there are very many.
+    """Cut a trajectory into segments between its corners; very long ones have fewer.
 
     Parameters
     ----------
     positions : array (n, 3)
         Corners, in order.
     after_gap : array of bool (n,), optional
-        No piece leads to these.
+        Corners without a segment before them.
 
     Returns
     -------
@@ -80,20 +80,20 @@ def pieces(positions: FloatArray, after_gap: np.ndarray | None = None) -> FloatA
 
 @dataclass(frozen=True)
 class LaidTruth:
-    """The true path, moved to where it fits the estimate best."""
+    """The true trajectory, aligned with the estimate."""
 
     positions: FloatArray
     """(n, 3) world of the map."""
     error: float
-    """Root mean square distance of the poses that were compared [m]."""
+    """RMS distance of the compared poses [m]."""
     similarity: Similarity
-    """From the world of the truth to that of the map."""
+    """From the world of the ground truth to that of the map."""
 
 
 def lay_truth(
     timestamps: FloatArray, positions: FloatArray, truth: Trajectory, *, with_scale: bool
 ) -> LaidTruth | None:
-    """Move the true path onto the estimated one.
+    """Align the true trajectory with the estimated one.
 
     Parameters
     ----------
@@ -102,14 +102,14 @@ def lay_truth(
     positions : array (n, 3)
         The estimate, in the world of the map, without lost poses.
     truth : Trajectory
-        What it should be, in a world of its own.
+        Ground truth, in its own world.
     with_scale : bool
-        Also scale: the map of a single camera has its own unit.
+        Whether to estimate the scale: the map of a single camera has its own unit.
 
     Returns
     -------
     LaidTruth or None
-        None while too few poses are known to have a true one.
+        None if too few poses have a true one.
     """
     fit = fit_by_time(
         truth.timestamps,
@@ -128,14 +128,14 @@ def lay_truth(
 
 
 class TruthBeside:
-    """The true path beside a growing one, as far as that has come; laid anew every second of it.
+    """The true trajectory up to the present time, aligned every second.
 
     Parameters
     ----------
     truth : Trajectory
-        What the path should be, in a world of its own.
+        Ground truth, in its own world.
     with_scale : bool
-        Also scale: the map of a single camera has its own unit.
+        Whether to estimate the scale: the map of a single camera has its own unit.
     """
 
     def __init__(self, truth: Trajectory, *, with_scale: bool) -> None:
@@ -150,16 +150,17 @@ class TruthBeside:
         map_index: int,
         path: Callable[[], tuple[FloatArray, FloatArray]],
     ) -> FloatArray:
-        """True positions (n, 3) until a time, in the world of the map.
+        """Return true positions (n, 3) until a time, in the world of the map.
 
         Parameters
         ----------
         now : float
             Seconds.
         map_index : int
-            Which map it is: what lay beside another one is void.
+            Number of the map; an alignment with another one is invalid.
         path : callable
-            Tells the path through the map: time stamps (n,), positions (n, 3), without lost poses.
+            Returns the trajectory in the map: time stamps (n,), positions (n, 3), without lost
+            poses.
         """
         if map_index != self._map_index:
             self._map_index, self._similarity, self._laid_at = map_index, None, -math.inf

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the last minute was like: inliers and time per stage, as plots in the page."""
+"""Plots of the last minute: inliers and time per stage."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class LastMinute:
         self._rows: deque[tuple[float, ...]] = deque(maxlen=_CAPACITY)
 
     def add(self, record: TrackingRecord, now: float | None = None) -> None:
-        """Take the figures of an image."""
+        """Add the figures of an image."""
         inliers = float(record.n_inliers) if record.state is TrackingState.OK else 0.0
         milliseconds = [record.milliseconds.get(stage, 0.0) for stage in STAGES]
         total = record.milliseconds.get("track", sum(milliseconds))
@@ -42,7 +42,7 @@ class LastMinute:
         self._rows.append((seen, inliers, total, *milliseconds))
 
     def table(self, now: float | None = None) -> FloatArray:
-        """Figures by image (n, 8): seconds (0 is now), inliers, milliseconds in all, by stage."""
+        """Return figures by image (n, 8): seconds (0 is now), inliers, ms in total, by stage."""
         rows = np.array(self._rows) if self._rows else np.zeros((0, 3 + len(STAGES)))
         rows[:, 0] -= time.perf_counter() if now is None else now
         return rows[rows[:, 0] > -SPAN]
@@ -54,7 +54,7 @@ class Plots:
     Parameters
     ----------
     server : viser.ViserServer
-        The page; they are put where its elements are being put.
+        The page; the plots are put at the present position in it.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:

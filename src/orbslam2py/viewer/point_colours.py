@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Colours of map points by what they are: height, age, number of observations, or as seen."""
+"""Colours of map points by height, age, number of observations, or image."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ _MANY_OBSERVATIONS = 24.0
 
 
 class ColourBy(str, Enum):
-    """What the colour of a point tells."""
+    """The meaning of the colour of a point."""
 
     IMAGE = "image"
-    """The colour in which it was seen."""
+    """The colour in the image."""
     HEIGHT = "height"
-    """How high it is: the first camera's up."""
+    """Its height: up direction of the first camera."""
     AGE = "age"
     """When it was made."""
     OBSERVATIONS = "observations"
-    """How often it was seen."""
+    """Number of its observations."""
     MAP = "map"
-    """Which map they belong to: the colour of its keyframes."""
+    """Its map: the colour of the map's keyframes."""
     NOTHING = "nothing"
     """All alike."""
 
@@ -58,7 +58,7 @@ class PointColours:
         self._table = _colour_table()
 
     def update_span(self) -> bool:
-        """Look whether the scale still fits; True if all pages are to be coloured anew."""
+        """Update the scale; True if all pages must be coloured again."""
         if self.by not in (ColourBy.HEIGHT, ColourBy.AGE):
             return False
         pages = list(self._model.points)
@@ -102,7 +102,7 @@ class PointColours:
 
 
 def _colour_table() -> ByteArray:
-    """From dark blue over green to yellow (256, 3): evenly, also for the colour-blind (viridis)."""
+    """From dark blue over green to yellow (256, 3), for the colour-blind too (viridis)."""
     ramp = np.arange(256, dtype=np.uint8)[:, None]
     table = cv2.applyColorMap(ramp, cv2.COLORMAP_VIRIDIS)[:, 0, ::-1].astype(np.float64)
     # Its darkest colours are hard to see on a dark ground.

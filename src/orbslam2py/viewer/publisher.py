@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hands what a running system sees and knows to those who watch, in a thread of its own.
+"""Sends frames and map changes of a running system to watchers, in a separate thread.
 
 >>> with orb.System("tum1", "rgbd") as slam, Publisher(slam, [viewer, video]):  # doctest: +SKIP
 ...     slam.run(sequence)
@@ -53,28 +53,29 @@ _RATES = "how many there may be in a second, more than 0"
 class Publisher:
     """Takes frames and changes of the map from a system, and gives them to watchers.
 
-    The system is delayed by copying the image and its keypoints, by nothing else: what watchers do
-    happens in the publisher's thread. Frames that come faster than they are wanted are passed over,
-    but for the last one, keyframes, and the records of all.
+    The system is delayed only by the copy of the image and its keypoints: watchers work in the
+    publisher's thread. Frames that come too fast for the watchers are skipped, except the last one
+    and keyframes; the records of all are kept.
 
     Parameters
     ----------
     system : System
         Whom to watch.
     watchers : iterable of Watcher
-        Who wants to see it.
+        The watchers.
     frame_rate : float
         Most images per second.
     map_rate : float
-        Most looks at the map per second.
+        Largest number of queries of the map per second.
     every_frame : bool
-        Pass over no frame, and look at the map with each: the track call waits until there is room
-        for one. For a video of a recorded sequence.
+        Skip no frame, and query the map with each: the track call waits until there is room for
+        one. For a video of a recorded sequence.
 
     Raises
     ------
     StateError
-        If `system` is none, a watcher lacks something that `Watcher` has, or a rate is not above 0.
+        If `system` is no `System`, a watcher lacks an attribute of `Watcher`, or a rate is not
+        above 0.
     """
 
     def __init__(
@@ -124,11 +125,11 @@ class Publisher:
         self._finalizer = weakref.finalize(self, _end, self._thread, weakref.ref(self))
 
     def count_dropped(self) -> None:
-        """An image was dropped before it came to the system."""
+        """Report an image that was dropped before tracking."""
         self._n_dropped += 1
 
     def close(self) -> None:
-        """Give the watchers what is left, and end; may be called again."""
+        """Send the remaining data to the watchers, and end; may be called again."""
         events = self._pipeline.back_end.events
         self._pipeline.frame_watchers = tuple(
             watch for watch in self._pipeline.frame_watchers if watch != self._see
@@ -171,7 +172,7 @@ class Publisher:
             self._condition.notify_all()
 
     def _make_room(self, view: FrameView) -> FrameView:
-        """Pass over the image before, unless it is a keyframe, of which some may wait."""
+        """Skip the image before, unless it is a keyframe, of which some may wait."""
         if not self._views:
             return view
         if self._views[-1][1].record.is_keyframe and len(self._views) < _WAITING_VIEWS:
@@ -250,7 +251,7 @@ class Publisher:
         return self._closing or view_wanted or bool(self._events)
 
     def _patience(self) -> float | None:
-        """Seconds until something is to be done without being called."""
+        """Return seconds until the next scheduled work."""
         if not self._watchers:
             return None
         due = self._next_view_at if self._views else math.inf
@@ -281,7 +282,7 @@ class Publisher:
         self._next_look_at = max(begin + self._map_period, end + _REST * (end - begin))
 
     def _look_at_resting_maps(self, *, now: bool) -> None:
-        """Little happens in them: a full adjustment, or that one of them is the active one."""
+        """Query inactive maps, which change rarely, for example by full bundle adjustment."""
         wanted = any(isinstance(watcher, RestingMapsWatcher) for watcher in self._watchers)
         if not wanted or (time.perf_counter() < self._next_resting_at and not now):
             return
@@ -323,7 +324,7 @@ def _rate(times: deque[float]) -> float:
 
 
 def _copied(image: ByteArray, *, rgb: bool) -> ByteArray:
-    """A copy of an image of one, three or four channels as grey or RGB."""
+    """Return a copy of an image of one, three or four channels as grey or RGB."""
     channels = 1 if image.ndim == 2 else image.shape[2]
     if channels == 1:
         return np.array(image.reshape(image.shape[:2]))

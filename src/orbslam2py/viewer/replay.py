@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run long past in the viewer's page, with a slider for the time."""
+"""A finished run in the viewer's page, with a slider for the time."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ _RATE = 15.0
 
 
 class Replay:
-    """Shows a run that is over.
+    """Shows a finished run.
 
     Parameters
     ----------
     run : RunFolder
         What to show.
     sequence : Sequence, optional
-        Its images and ground truth, which the folder does not hold.
+        Its images and ground truth, which are not in the folder.
     host, port
         See `LiveView`.
 
@@ -49,9 +49,9 @@ class Replay:
     StateError
         If viser is not installed, or the page cannot be served there.
     DatasetError
-        If the run saw no images, or the ground truth of its sequence cannot be read.
+        If the run has no images, or the ground truth of its sequence cannot be read.
     MapFileError
-        If the file of its map is not whole.
+        If the file of its map is incomplete.
     """
 
     def __init__(
@@ -93,12 +93,12 @@ class Replay:
 
     @property
     def address(self) -> str:
-        """What a person types into a browser."""
+        """Address of the page for a browser."""
         return self.page.address
 
     @property
     def position(self) -> int:
-        """The image that is shown, from 0."""
+        """Number of the shown image, from 0."""
         return self._shown
 
     def stop(self) -> None:
@@ -213,7 +213,7 @@ class Replay:
         return _fitted(to_rgb(image, rgb=self._sequence.settings.camera.rgb))
 
     def _kept_image(self, position: int) -> int | None:
-        """Number of the last image until then that is in the folder of the run."""
+        """Return the number of the last image until then that is in the folder of the run."""
         row = int(np.searchsorted(self._kept, self._frames.index[position], side="right")) - 1
         return None if row < 0 else int(self._kept[row])
 
@@ -268,7 +268,7 @@ def _fitted(picture: ByteArray) -> ByteArray:
 
 
 def _figures_of(frames: Frames) -> FloatArray:
-    """Inliers, milliseconds in all and by stage (n, 2 + stages); 0 where there are none."""
+    """Return inliers, milliseconds in total and by stage (n, 2 + stages); 0 if unknown."""
     none = np.full(len(frames), np.nan)
     stages = [frames.milliseconds.get(stage, none) for stage in ("track", *STAGES)]
     return np.asarray(np.nan_to_num(np.column_stack([frames.inliers, *stages])))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps that rest beside the active one, as watchers see them."""
+"""Inactive maps for watchers."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from orbslam2py.maps.changes import MapChanges, MapFollower
 
 @dataclass(frozen=True, eq=False)
 class RestingMaps:
-    """The maps that rest, and what has changed in them since the last notification.
+    """The inactive maps, and their changes since the last notification.
 
-    Each map is a world of its own: positions in two of them have nothing to do with each other.
+    Each map has a separate world: positions in two of them are not related.
     """
 
     active: int
-    """Number of the map that is tracked in, as in `TrackingRecord.map_index`."""
+    """Number of the active map, as in `TrackingRecord.map_index`."""
     there: tuple[int, ...]
-    """Numbers of those that rest, ascending. One that was reported before and is not named here
-    is the active one now, or part of another, or no more."""
+    """Numbers of the inactive maps, ascending. A map that was reported before and is missing here
+    is now active, merged, or dropped."""
     changes: tuple[MapChanges, ...]
-    """Of those that have changed; in the first for a map, all of it."""
+    """Changes of each changed map; the first for a map contains all of it."""
 
 
 @runtime_checkable
 class RestingMapsWatcher(Protocol):
-    """A watcher that also gets the maps that rest; others see the active one only."""
+    """A watcher that also gets the inactive maps; others see only the active one."""
 
     def on_resting_maps(self, maps: RestingMaps) -> None:
-        """Other maps rest than at the last call, or one of them has changed."""
+        """Called when the set of inactive maps or one of them has changed."""
         ...
 
 
 class RestingMapsFollower:
-    """Tells what has changed in the maps that rest.
+    """Returns the changes of inactive maps.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class RestingMapsFollower:
         Returns
         -------
         RestingMaps or None
-            None if nothing has changed; always, as long as there is one map.
+            The changes; None if there are none, and as long as there is only one map.
         """
         active, numbers = int(self._map.active_map), self._map.maps
         there = tuple(int(number) for number in numbers if number != active)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps that rest, drawn beside the active one: each in its colour, apart from all others."""
+"""Inactive maps, drawn beside the active one: each in its colour, separated from the others."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _DIM = 0.75
 
 @dataclass(eq=False)
 class _Resting:
-    """A map that rests, and what is drawn of it."""
+    """An inactive map, and its drawn parts."""
 
     frame: Any
     model: MapModel = field(default_factory=MapModel)
@@ -37,9 +37,9 @@ class _Resting:
 
 
 class RestingScene:
-    """Draws the maps that rest in a row beside the active one.
+    """Draws the inactive maps in a row beside the active one.
 
-    Not for several threads at a time.
+    Use it in one thread at a time.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class RestingScene:
         }
 
     def apply(self, maps: RestingMaps) -> None:
-        """Take over what has changed."""
+        """Apply the changes."""
         for number in set(self._maps) - set(maps.there):
             self._maps.pop(number).frame.remove()  # with all that is below it
         for number in maps.there:
@@ -75,17 +75,17 @@ class RestingScene:
                 self._maps[changes.map_index].model.apply(changes)
 
     def show(self, number: int, visible: bool) -> None:
-        """Show or hide a map, also when it comes to rest later."""
+        """Show or hide a map, also if it becomes inactive later."""
         (self._hidden.discard if visible else self._hidden.add)(number)
         if number in self._maps:
             self._maps[number].frame.visible = visible
 
     def is_shown(self, number: int) -> bool:
-        """Whether a map is to be seen."""
+        """Return whether a map is shown."""
         return number not in self._hidden
 
     def resize(self) -> None:
-        """Cameras and points are to have another size."""
+        """Change the sizes of cameras and points."""
         for one in self._maps.values():
             one.stale.tree.add(0)
             one.stale.points |= set(one.model.points)
@@ -100,7 +100,7 @@ class RestingScene:
         point_size
             Diameter of a point.
         at_most
-            Pages of points that are drawn at a time; None: all.
+            Number of pages of points to draw at a time; None: all.
         """
         left = at_most
         for number, one in self._maps.items():
@@ -119,7 +119,7 @@ class RestingScene:
             one.stale = Stale(points=one.stale.points - set(pages))
 
     def place(self, active: int, model: MapModel) -> None:
-        """Put the maps into a row to the right of the active one, and say which is which."""
+        """Put the maps into a row to the right of the active one, with labels."""
         if not self._maps:
             self._remove_label()
             return
@@ -138,7 +138,7 @@ class RestingScene:
             edge = float(one.offset[0] + box[1][0])
 
     def places(self) -> FloatArray:
-        """Corners (n, 3) of the maps that are shown, where they are drawn."""
+        """Return the corners (n, 3) of the shown maps at their drawn positions."""
         corners = [np.zeros((0, 3))]
         for number, one in self._maps.items():
             if self.is_shown(number):
@@ -210,13 +210,13 @@ class RestingScene:
         self._label = None
 
     def show_label(self, visible: bool) -> None:
-        """Show or hide what is written above the active map."""
+        """Show or hide the label above the active map."""
         if self._label is not None:
             self._label.visible = visible
 
 
 def box_of(model: MapModel) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner (3,) of a map, without points that are far out."""
+    """Return the lowest and highest corner (3,) of a map, without distant points."""
     places = [page.positions for page in model.points.values()]
     step = max(1, model.n_points // _SAMPLE)
     points = np.concatenate([np.zeros((0, 3)), *(part[::step] for part in places)])
@@ -244,7 +244,7 @@ def _gather(one: _Resting) -> None:
 
 
 def _above(low: FloatArray, high: FloatArray) -> FloatArray:
-    """In the middle above a box; y is down."""
+    """Return the middle above a box; y is down."""
     return np.array([0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])])
 
 

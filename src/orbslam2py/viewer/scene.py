@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The three-dimensional part of the page: nodes of viser that show a `MapModel`.
 
-What has changed is sent, page by page; what a layer holds is hidden with its parent node.
+Changes are sent page by page; the parent node hides all elements of a layer.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _FOV = 0.9
 
 @dataclass
 class Selection:
-    """A keyframe that somebody has clicked, and its neighbours."""
+    """A keyframe that a user has clicked, and its neighbours."""
 
     keyframe: int
     neighbours: IntArray
@@ -60,7 +60,7 @@ class Selection:
 class Scene:
     """Draws a map, a camera and its paths.
 
-    Not for several threads at a time.
+    Use it in one thread at a time.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Scene:
     colours : PointColours
         Of its points.
     on_click : callable
-        Called with the id of a keyframe that somebody clicks.
+        Called with the id of a clicked keyframe.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class Scene:
         self._selection.visible = visible
 
     def set_keyframe_colour(self, colour: Colour) -> bool:
-        """Draw keyframes in another colour; whether all of them are to be drawn again."""
+        """Set the colour of keyframes; return whether all of them must be drawn again."""
         if colour == self.keyframe_colour:
             return False
         self.keyframe_colour = colour
@@ -132,7 +132,7 @@ class Scene:
 
     # ---- the map ---------------------------------------------------------------------------------
     def draw(self, stale: Stale) -> None:
-        """Draw what has changed in the map."""
+        """Draw the changes of the map."""
         if stale.everything:
             self.clear()
         for number in sorted(stale.points):
@@ -172,12 +172,12 @@ class Scene:
         return max(1e-6, _POINT * self.size * self.point_size)
 
     def fit_size(self, distance: float) -> bool:
-        """Make cameras and points as large as what is seen at a distance asks for.
+        """Adapt the sizes of cameras and points to the distance of the view.
 
         Returns
         -------
         bool
-            Whether everything is to be drawn anew.
+            Whether to draw everything again.
         """
         fitting = _SIZE * distance
         if fitting <= 0 or (self.size / _SIZE_TOLERANCE <= fitting <= self.size * _SIZE_TOLERANCE):
@@ -232,7 +232,7 @@ class Scene:
 
     # ---- the camera ------------------------------------------------------------------------------
     def draw_camera(self, T_wc: FloatArray | None, image: ByteArray | None, aspect: float) -> None:
-        """Draw where the camera is now, with what it sees; nothing while nobody knows."""
+        """Draw the present camera with its image; nothing if its pose is unknown."""
         if T_wc is None:
             self._remove("/camera/now")
             return
@@ -269,7 +269,7 @@ class Scene:
         self._lines(f"/{layer}/all", lines, colour, width)
 
     def draw_selection(self, selection: Selection | None) -> None:
-        """Mark a keyframe, and the way to its neighbours."""
+        """Mark a keyframe, with lines to its neighbours."""
         model = self._model
         row = np.zeros(0, np.int64)
         if selection is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A web server for the page: where it listens, and how a person gets there."""
+"""A web server for the page, and its address."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
     Parameters
     ----------
     host : str
-        Address of this computer to listen at; by default only this computer itself is heard.
+        Address of this computer to listen at; by default only this computer can connect.
     port : int, optional
         The port, which must be free; 0: any free one. By default 8080 or the next free one.
 
     Raises
     ------
     StateError
-        If viser is not installed, the port is taken or the host is none of this computer's.
+        If viser is not installed, the port is in use or the host is no address of this computer.
     """
     require_viser()
     chosen = _find_port(host, DEFAULT_PORT if port is None else port, only=port is not None)
@@ -78,7 +78,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
 
 
 def stop_server(server: viser.ViserServer) -> None:
-    """End it; the pages in browsers stay as they are."""
+    """Stop it; the pages in browsers stay open."""
     unwanted = _unwanted.pop(server, None)
 
     def stop() -> None:
@@ -94,7 +94,7 @@ def stop_server(server: viser.ViserServer) -> None:
 
 
 def address_of(server: viser.ViserServer) -> str:
-    """What a person types into a browser on this computer."""
+    """Address of the page for a browser on this computer."""
     host = server.get_host()
     if host in ("0.0.0.0", "::", ""):
         host = "localhost"
@@ -104,7 +104,7 @@ def address_of(server: viser.ViserServer) -> str:
 
 
 def open_page(address: str) -> bool:
-    """Open the page in the person's browser, if there is a screen it can appear on."""
+    """Open the page in the user's browser, if there is a screen."""
     if os.environ.get("SSH_CONNECTION") or not _has_screen():
         return False
     try:
@@ -121,12 +121,12 @@ def _has_screen() -> bool:
 
 
 def require_viser() -> None:
-    """See that viser is installed.
+    """Check that viser is installed.
 
     Raises
     ------
     StateError
-        With the line that installs it.
+        With the command that installs it.
     """
     try:
         import viser  # noqa: F401, PLC0415  # optional, and slow to load
@@ -182,7 +182,7 @@ def _is_loopback(host: str) -> bool:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Viser prints boxes; where the page is, is said once and by us."""
+    """Suppress the output of viser: we print the address once ourselves."""
     import rich  # noqa: PLC0415  # only with viser
 
     console = rich.get_console()

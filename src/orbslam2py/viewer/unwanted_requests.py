@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Requests of other programs than the page: refused without a word on the terminal."""
+"""Requests of other programs than the page: refused without a log message."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _READER = "_message_consumer"
 
 
 class UnwantedRequests(logging.Filter):
-    """Keeps it off the log that a server was sent what is none of the page's.
+    """Keeps errors about foreign requests out of the log.
 
-    The library closes the connection and goes on serving. Our own errors, for example of a
+    The library closes the connection and continues to serve. Our own errors, for example of a
     button, are logged as usual, and so are messages of other servers in this program.
 
     Parameters
@@ -33,11 +33,11 @@ class UnwantedRequests(logging.Filter):
         _LIBRARY.addFilter(self)
 
     def stop(self) -> None:
-        """Log everything again; may be repeated."""
+        """Log everything again; may be called again."""
         _LIBRARY.removeFilter(self)
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether a record is to be logged."""
+        """Return whether a record is logged."""
         if not (self._is_of_server(record) and _is_of_sender(record)):
             return True
         _log.debug("%s", record.getMessage(), exc_info=record.exc_info)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What those who watch a running system are given: plain data, theirs to keep."""
+"""The data for watchers of a running system: plain copies."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from orbslam2py.slam.records import FrameFeatures, TrackingRecord
 
 @dataclass(frozen=True)
 class QueueState:
-    """How the stream of images is keeping up."""
+    """Speed of the stream of images."""
 
     n_frames: int = 0
-    """Images tracked since the publisher began."""
+    """Number of images tracked since the publisher began."""
     n_not_shown: int = 0
-    """Of these, passed over because the rate is limited or a watcher was slow."""
+    """Number of these that were skipped because the rate is limited or a watcher was slow."""
     n_dropped: int = 0
-    """Images that were never tracked: they were overtaken by the next one."""
+    """Number of images that were never tracked, because the next one came first."""
     frames_per_second: float = 0.0
     """Images tracked, over the last second or so."""
     latency: str = ""
@@ -33,60 +33,61 @@ class QueueState:
 
 @dataclass(frozen=True, eq=False)
 class FrameView:
-    """One image, and what tracking made of it."""
+    """One image, and the result of tracking."""
 
     image: ByteArray
     """(h, w) grey, or (h, w, 3) RGB."""
     record: TrackingRecord
     """Pose, state, reason, milliseconds per stage."""
     earlier: tuple[TrackingRecord, ...]
-    """Records of the images since the last view, which were not shown; oldest first."""
+    """Records of the images since the last view that were skipped; oldest first."""
     features: FrameFeatures
-    """Keypoints and what they are matched with; coordinates are undistorted."""
+    """Keypoints and their matches; coordinates are undistorted."""
     pixels: npt.NDArray[np.float32]
-    """(n, 2) where the keypoints lie in `image`."""
+    """(n, 2) pixels of the keypoints in `image`."""
     visual_odometry: npt.NDArray[np.bool_]
-    """(n,) keypoints that the pose hangs on and that are no points of the map."""
+    """(n,) keypoints that are inliers of the pose, but have no map point."""
     local_points: IntArray
     """(p,) ids of the points of the local map."""
     start_lines: FloatArray | None
-    """While a single camera's map begins: (m, 4) pixels x, y in the first view and x, y now."""
+    """While a single camera's map begins: (m, 4) pixels x, y in the first view and in this
+    image."""
     localization: bool
-    """The map stays as it is."""
+    """Localization mode: the map is fixed."""
     queue: QueueState
 
     @property
     def matched(self) -> npt.NDArray[np.bool_]:
-        """(n,) keypoints that the pose hangs on and that are points of the map."""
+        """(n,) keypoints that are inliers of the pose and have a map point."""
         matched: npt.NDArray[np.bool_] = self.features.inliers & ~self.visual_odometry
         return matched
 
 
 @runtime_checkable
 class Watcher(Protocol):
-    """Somebody who looks on: a viewer, a recording, a video.
+    """A watcher: a viewer, a recording, a video.
 
-    All is called in the publisher's thread, one after the other. Who raises is left out from then
-    on, with one warning; the system goes on.
+    All methods are called in the publisher's thread, one after the other. A watcher that raises is
+    removed, with one warning; the system continues.
     """
 
     @property
     def name(self) -> str:
-        """What warnings call it: "the viewer"."""
+        """Its name in warnings: "the viewer"."""
         ...
 
     def on_frame(self, view: FrameView) -> None:
-        """An image has been tracked."""
+        """Called after an image was tracked."""
         ...
 
     def on_map(self, changes: MapChanges) -> None:
-        """The map is another one than at the last call."""
+        """Called after the map has changed."""
         ...
 
     def on_event(self, event: Event) -> None:
-        """Something has happened: see `orbslam2py.Callbacks`."""
+        """Called after an event: see `orbslam2py.Callbacks`."""
         ...
 
     def close(self) -> None:
-        """Nothing more will come; called once."""
+        """Called once at the end."""
         ...

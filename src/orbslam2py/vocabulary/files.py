@@ -26,11 +26,11 @@ from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
 
 Progress = Callable[[float], object]
-"""Hears the fraction done, 0 to 1."""
+"""Gets the completed fraction, 0 to 1."""
 
 
 class VocabularyFormat(str, Enum):
-    """What a file holds, whatever its name."""
+    """The format of a file, whatever its name."""
 
     BINARY = "binary"
     TEXT = "text"
@@ -47,12 +47,12 @@ _BLOCK = 1 << 20
 
 
 def detect_format(path: Path) -> VocabularyFormat:
-    """Tell the format of a file by its first bytes.
+    """Return the format of a file by its first bytes.
 
     Raises
     ------
     VocabularyError
-        If the file cannot be read or is none of them.
+        If the file cannot be read or has none of these formats.
     """
     with _reading(path), path.open("rb") as file:
         head = file.read(512)
@@ -80,7 +80,7 @@ def read_nodes(
     Raises
     ------
     VocabularyError
-        Naming the path, the first bad line or node, and what is wrong with it.
+        The message names the path, the first bad line or node, and the fault.
     """
     with _reading(path):
         if file_format is VocabularyFormat.YAML:
@@ -130,7 +130,7 @@ def _is_tar(head: bytes) -> bool:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Turn what can go wrong while reading into errors that name the path."""
+    """Convert errors of reading to errors that name the path."""
     try:
         yield
     except VocabularyError as error:
@@ -150,7 +150,7 @@ def _reading(path: Path) -> Iterator[None]:
 def _open_text(
     path: Path, file_format: VocabularyFormat
 ) -> Iterator[tuple[IO[bytes], _textio._Source]]:
-    """Give the file itself, for its position, and the stream of text in it."""
+    """Yield the file itself, for its position, and the stream of text in it."""
     with path.open("rb") as raw, ExitStack() as stack:
         unpacked: IO[bytes] = raw
         if _is_gzip(path):
@@ -191,7 +191,7 @@ _YAML_WORD = re.compile(rb"wordId\s*:\s*(\d+)\s*,\s*nodeId\s*:\s*(\d+)")
 
 
 def _read_yaml(path: Path) -> tuple[_textio.Header, _textio.Columns]:
-    """Read DBoW2's YAML form, whose nodes come in any order and carry their numbers."""
+    """Read DBoW2's YAML form, whose nodes are in any order and contain their numbers."""
     data = path.read_bytes()
     nodes_at = data.find(b"nodes:")
     words_at = data.find(b"words:", nodes_at)

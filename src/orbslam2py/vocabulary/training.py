@@ -63,12 +63,13 @@ def train_vocabulary(
     Parameters
     ----------
     images : iterable of path
-        Photographs like those of the places to recognise, one of each place.
+        Photographs of places like those to recognise, one of each place.
     options : TrainingOptions, optional
     features : OrbOptions, optional
-        How features are found; default: 2000 per image.
+        Options of the feature extraction; default: 2000 per image.
     progress : callable, optional
-        Called with the name of the step and the fraction done, 0 to 1; returning False cancels.
+        Called with the name of the step and the completed fraction, 0 to 1; returning False
+        cancels.
 
     Returns
     -------
@@ -111,7 +112,7 @@ def _describe_images(
     options: core.TrainingOptions,
     report: Callable[[str, float], object],
 ) -> list[ByteArray] | None:
-    """Descriptors of every image, in order; None when cancelled."""
+    """Return the descriptors of every image, in order; None if cancelled."""
     of_thread = threading.local()
 
     def describe(path: Path) -> ByteArray:

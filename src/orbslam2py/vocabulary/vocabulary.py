@@ -2,8 +2,8 @@
 """Vocabularies: find, read, convert and train them.
 
 A vocabulary is a tree over ORB descriptors whose leaves are visual words; relocalization, loop
-closing and matching by words need one. The package ships one. ``ORBvoc.txt`` and other files in its
-format can be used as well: they are parsed once and kept in the binary format from then on.
+closing and matching by words need one. The package ships one. ``ORBvoc.txt`` and other files of its
+format can be used as well: they are parsed once and stored in the binary format.
 """
 
 from __future__ import annotations
@@ -51,13 +51,14 @@ def load_vocabulary(
     Parameters
     ----------
     path : path, optional
-        Default: the file that the environment variable ``ORBSLAM2PY_VOCABULARY`` names, else the
-        vocabulary of the package.
+        Default: the file in the environment variable ``ORBSLAM2PY_VOCABULARY``, else the vocabulary
+        of the package.
     cache : bool
-        Keep a binary copy of a text file beside it (or in the user's cache folder), and use it the
-        next time as long as the text file does not change.
+        Store a binary copy of a text file beside it (or in the user's cache folder), and use it as
+        long as the text file does not change.
     progress : callable, optional
-        Called with the fraction done, 0 to 1, while a text file is parsed. An exception ends it.
+        Called with the completed fraction, 0 to 1, while a text file is parsed. An exception ends
+        it.
 
     Returns
     -------
@@ -67,7 +68,7 @@ def load_vocabulary(
     Raises
     ------
     VocabularyError
-        Naming the file and, for text files, the first bad line.
+        The message names the file and, for text files, the first bad line.
     """
     if path is None:
         path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
@@ -92,9 +93,9 @@ def _open_binary(path: Path) -> core.Vocabulary:
 
 
 def vocabulary_name(choice: core.Vocabulary | str | os.PathLike[str] | None) -> str:
-    """Name the file of a vocabulary, as `load_vocabulary` chooses it.
+    """Return the file of a vocabulary, as `load_vocabulary` chooses it.
 
-    One in memory has the name of the package's own if it is equal, else none.
+    One in memory has the name of the package's own if it is equal, otherwise None.
     """
     if isinstance(choice, core.Vocabulary):
         own = default_vocabulary_path()
@@ -103,7 +104,7 @@ def vocabulary_name(choice: core.Vocabulary | str | os.PathLike[str] | None) -> 
 
 
 def _stamp(path: Path) -> core.VocabularySource:
-    """Size, time and samples of a file: a change is noticed without reading all of it."""
+    """Return size, time and samples of a file, to notice a change without reading all of it."""
     sample = 1 << 20
     try:
         status = path.stat()
@@ -136,7 +137,7 @@ def _open_cache(path: Path) -> core.Vocabulary | None:
 def _keep(
     vocabulary: core.Vocabulary, path: Path, source: core.VocabularySource
 ) -> core.Vocabulary | None:
-    """Write the binary copy and open it, so that processes share its pages; None if impossible."""
+    """Write the binary copy and open it, so that processes share its memory; None if impossible."""
     for copy in _cache_places(path):
         if copy.exists():
             present = _open_cache(copy)
@@ -159,22 +160,22 @@ def save_vocabulary(
     comment: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Write a vocabulary; the name decides: ``.bvoc``, ``.txt`` or ``.txt.gz``.
+    """Write a vocabulary; the name determines the format: ``.bvoc``, ``.txt`` or ``.txt.gz``.
 
     Parameters
     ----------
     vocabulary : Vocabulary
     path : path
-        Replaced only when everything has been written.
+        The file; replaced only after everything is written.
     comment : str, optional
-        Origin and licence, kept in the binary format; default: that of the vocabulary.
+        Origin and licence, stored in the binary format; default: those of the vocabulary.
     progress : callable, optional
-        Called with the fraction done, 0 to 1.
+        Called with the completed fraction, 0 to 1.
 
     Raises
     ------
     VocabularyError
-        If the name has another ending or the file cannot be written.
+        If the name has another suffix or the file cannot be written.
     """
     if not isinstance(vocabulary, core.Vocabulary):
         raise VocabularyError(
@@ -233,9 +234,9 @@ def convert_vocabulary(
     source : path
         As for :func:`load_vocabulary`.
     target : path
-        As for :func:`save_vocabulary`: the name decides the format.
+        As for :func:`save_vocabulary`: the name determines the format.
     progress : callable, optional
-        Called with the fraction done, 0 to 1.
+        Called with the completed fraction, 0 to 1.
 
     Returns
     -------
@@ -261,7 +262,7 @@ def _half(progress: Progress | None, begin: float) -> Progress | None:
 # ---- look ----------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class VocabularyInfo:
-    """What a vocabulary file holds."""
+    """The properties of a vocabulary file."""
 
     path: Path
     format: VocabularyFormat
@@ -281,7 +282,7 @@ class VocabularyInfo:
 
 
 def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInfo:
-    """Read a vocabulary as a whole, check all of it, and say what it is.
+    """Read and check a whole vocabulary, and return its properties.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sequences of a standard data set, each sensor, several seeds, beside published figures."""
+"""The sequences of a standard data set, each sensor, several seeds, with published figures."""
 
 from orbslam2py.batches.standard_sets.benchmark import BenchmarkResult, benchmark
 from orbslam2py.batches.standard_sets.entries import Entry, is_lost

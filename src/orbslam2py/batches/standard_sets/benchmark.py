@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""All sequences of a standard data set, each sensor, several seeds: a page and a table to paste."""
+"""All sequences of a standard data set, each sensor, several seeds: a page and a table."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ PAGE, TABLE = "benchmark.html", "benchmark.md"
 
 @dataclass(frozen=True)
 class BenchmarkResult:
-    """A benchmark that has ended.
+    """The result of a benchmark.
 
     Attributes
     ----------
     kind
         The data set.
     batch
-        The runs, and what is left of them.
+        The runs, and how many remain.
     page, table
         The page, and the same in Markdown.
     """
@@ -49,7 +49,7 @@ class BenchmarkResult:
 
     @property
     def entries(self) -> list[Entry]:
-        """Runs of each sequence with each sensor, beside what papers tell."""
+        """Runs of each sequence with each sensor, with published figures."""
         return entries_of(self.kind, self.batch.rows)
 
 
@@ -71,39 +71,38 @@ def benchmark(
     stop: threading.Event | None = None,
     command: str | None = None,
 ) -> BenchmarkResult:
-    """Run all sequences of a standard data set and put the results beside published figures.
+    """Run all sequences of a standard data set and compare the results with published figures.
 
     Parameters
     ----------
     kind
         ``tum``, ``kitti`` or ``euroc``.
     root
-        Folder that holds sequences, also in folders below it.
+        Folder with the sequences, also in its subfolders.
     output
         Folder for the results: those of `batch`, ``benchmark.html`` and ``benchmark.md``.
     sensors
-        By default every one that a sequence has images for.
+        By default all sensors that a sequence has images for.
     seeds
-        How many runs of each.
+        Number of runs of each.
     options
         As in a job file, such as ``deterministic`` or ``max_frames``.
     command
-        The line that started it, for the page.
+        The command line, for the page.
     resume, scheduler, workers, memory_limit, report_pages, progress, watch, stop
         As for `batch`.
 
     Returns
     -------
     BenchmarkResult
-        Also if runs failed or were lost: the page says which.
+        Also if runs failed or lost tracking: the page says which.
 
     Raises
     ------
     DatasetError
-        If there are no sequences, none has images for the sensors, or the folder cannot take
-        results.
+        If there are no sequences, none has images for the sensors, or the folder cannot be used.
     SettingsError
-        If options make no sense.
+        If options are invalid.
     OSError
         If a file cannot be written.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs of one sequence with one sensor: each seed, the median, and what papers tell."""
+"""Runs of one sequence with one sensor: each seed, the median, and published figures."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ LEAST_PART = 0.8
 
 
 def is_lost(row: dict[str, Any]) -> bool:
-    """Tell whether a run failed, or has poses in its path for less than 80 % of the frames.
+    """Return whether a run failed, or has poses in its trajectory for less than 80 % of the frames.
 
     Parameters
     ----------
     row
-        Of the table of a batch.
+        Row of the table of a batch.
     """
     return row["state"] != "done" or part_in_path(row) < LEAST_PART
 
 
 def part_in_path(row: dict[str, Any]) -> float:
-    """Part of the frames that have a pose in the path that is judged: that of the last map."""
+    """Share of the frames with a pose in the evaluated trajectory, that of the main map."""
     frames = row.get("frames") or 0
     poses = row.get("matched_of_poses")
     poses = row.get("tracked") or 0 if poses is None else poses
@@ -42,9 +42,9 @@ class Entry:
     sequence, sensor
         What was run.
     rows
-        Of the table, one a seed, in their order.
+        Rows of the table, one for each seed, in their order.
     published
-        What papers tell of it.
+        Published figures for it.
     """
 
     sequence: str
@@ -72,7 +72,7 @@ def _uses_imu(rows: list[dict[str, Any]]) -> bool:
 
 
 def entries_of(kind: StandardSet, rows: list[dict[str, Any]]) -> list[Entry]:
-    """Put runs that differ in their seeds alone together, sensor by sensor."""
+    """Group runs that differ only in their seeds, by sensor."""
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in rows:
         groups.setdefault((str(row["sensor"] or ""), str(row["sequence"])), []).append(row)

@@ -19,7 +19,7 @@ _DEPTH = 5
 
 
 class StandardSet(str, Enum):
-    """A data set that systems are compared on."""
+    """A data set for comparisons of systems."""
 
     TUM = "tum"
     """TUM RGB-D (Sturm et al., IROS 2012)."""
@@ -35,7 +35,7 @@ class StandardSet(str, Enum):
         Raises
         ------
         DatasetError
-            Listing the names, if there is none like that.
+            For an unknown name; the message lists the names.
         """
         return member_of(cls, value, "the standard data set")
 
@@ -63,15 +63,15 @@ def find_sequences(kind: StandardSet | str, root: Path) -> dict[str, Path]:
     Parameters
     ----------
     kind
-        Which data set; sequences of others are passed by.
+        Which data set; sequences of others are ignored.
     root
         Where to look.
 
     Returns
     -------
     dict
-        Folders by name, in the order of the names. Where two sequences have one name, the folders
-        above belong to it.
+        Folders by name, in the order of the names. If two sequences have the same name, their
+        parent folders are added to it.
 
     Raises
     ------

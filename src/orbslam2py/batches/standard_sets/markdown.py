@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of a benchmark as a table in Markdown, to be pasted."""
+"""The results of a benchmark as a table in Markdown."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ _DRIFT = (
 
 
 def figures_of(kind: StandardSet) -> tuple[Compared, ...]:
-    """Return what papers give for a data set: segment errors for KITTI alone."""
+    """Return the published figures of a data set: segment errors only for KITTI."""
     outdoors = kind is StandardSet.KITTI
     ate = Compared("ATE", "m", "ate_rmse_m", 3, 1 if outdoors else 3)
     return (ate, *(_DRIFT if outdoors else ()))
 
 
 def spread_text(spread: Spread | None, digits: int) -> str:
-    """Median, and the range behind it if there is one."""
+    """Return the median, followed by the range if there is one."""
     if spread is None:
         return ""
     median, least, most = (f"{x:.{digits}f}" for x in (spread.median, spread.least, spread.most))
@@ -50,7 +50,7 @@ def spread_text(spread: Spread | None, digits: int) -> str:
 
 
 def published_text(published: Published | None, figure: Compared) -> str:
-    """Print a figure as the paper does; X for a sequence that it marks as lost."""
+    """Return a figure in the paper's form; X for a sequence that it marks as lost."""
     if published is None:
         return ""
     if published.is_lost:
@@ -60,12 +60,12 @@ def published_text(published: Published | None, figure: Compared) -> str:
 
 
 def has_published(entries: list[Entry], system: str, figure: Compared) -> bool:
-    """Tell whether a system has a figure for any of the sequences."""
+    """Return whether a system has a figure for any of the sequences."""
     return any(published_text(entry.of(system), figure) for entry in entries)
 
 
 def run_texts(entry: Entry, figure: Compared) -> list[str]:
-    """Return a figure of every run: X for a lost one, with the value behind it if there is one."""
+    """Return a figure of every run: X for a lost one, with its value if there is one."""
     texts = []
     for row in entry.rows:
         value = row.get(figure.key)
@@ -76,7 +76,7 @@ def run_texts(entry: Entry, figure: Compared) -> list[str]:
 
 
 def markdown_table(kind: StandardSet, entries: list[Entry]) -> str:
-    """Make a table a sensor: medians and ranges, published figures, and every single run."""
+    """Make one table for each sensor: medians and ranges, published figures, and every run."""
     lines = [f"## {kind.full_name}, orbslam2py {__version__}", ""]
     sources: dict[str, None] = {}
     for sensor in dict.fromkeys(entry.sensor for entry in entries):

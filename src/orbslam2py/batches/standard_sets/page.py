@@ -41,9 +41,9 @@ def benchmark_page(
     entries
         Runs of each sequence with each sensor.
     done
-        The batch, in whose folder the runs lie.
+        The batch, whose folder contains the runs.
     command
-        The line that started it; None if it was started from Python.
+        The command line; None if it was started from Python.
     """
     sensors = list(dict.fromkeys(entry.sensor for entry in entries))
     parts, links = [_notes(entries, done)], []
@@ -145,7 +145,7 @@ def _all_runs(kind: StandardSet, entries: list[Entry]) -> Markup:
 
 
 def _breakable(name: str) -> Markup:
-    """Let a long name be broken where its words end."""
+    """Allow line breaks between the words of a long name."""
     first, *words = re.split(r"(?<=[_-])", short_name(name))
     return join(first, *(join(Markup("<wbr>"), word) for word in words))
 
@@ -158,7 +158,7 @@ def _result(row: dict[str, Any]) -> Markup:
 
 
 def _failures(entries: list[Entry]) -> Markup | None:
-    """Why runs failed: below the table, whose columns are narrow."""
+    """Return why runs failed, for the space below the table."""
     told = [
         element("li", element("b", f"{row['run']}: "), str(row["reason"]))
         for entry in entries
@@ -173,7 +173,7 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def _repeat(kind: StandardSet, entries: list[Entry], command: str | None) -> Markup:
-    """What repeats it, where it was run, and where published figures come from."""
+    """Return how to repeat it, the computer, and the sources of published figures."""
     rows = [row for entry in entries for row in entry.rows]
     options = sorted({name for row in rows for name in row if name.startswith("option.")})
     told: Cells = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of a benchmark: the error of every run, and the paths of all seeds over the truth."""
+"""Pictures of a benchmark: the error of every run, and the trajectories of all seeds."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _OURS, _LOST, _PUBLISHED = "run0", "lost", ("run1", "run2")
 
 
 def short_name(sequence: str) -> str:
-    """Leave out what all sequences of TUM RGB-D begin with."""
+    """Remove the common beginning of the names of TUM RGB-D."""
     return sequence.removeprefix("rgbd_dataset_")
 
 
 def error_picture(kind: StandardSet, entries: list[Entry]) -> Markup | None:
-    """Draw the absolute error of every run on a logarithmic axis, a line a sequence."""
+    """Draw the absolute error of every run on a logarithmic axis, one line for each sequence."""
     ours = [(k, float(row["ate_rmse_m"]), is_lost(row)) for k, entry in enumerate(entries)
             for row in entry.rows if row.get("ate_rmse_m")]  # fmt: skip
     printed = [
@@ -123,7 +123,7 @@ def _ticks(low: float, high: float) -> Iterator[float]:
 
 
 def paths_pictures(entries: list[Entry], folder: Path) -> list[Markup]:
-    """Draw the paths of all runs of each sequence with each sensor over the truth, from above."""
+    """Draw the trajectories of all runs of each sequence and sensor from above."""
     return [
         picture
         for number, entry in enumerate(entries)

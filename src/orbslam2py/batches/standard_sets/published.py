@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures that papers print, from ``data/published/figures.yaml``, each with its source."""
+"""Published figures, from ``data/published/figures.yaml``, each with its source."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class Published:
-    """What a paper tells of a system on a sequence.
+    """A published figure of a system on a sequence.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Published:
     source
         The paper and the table.
     ate_rmse_m, t_rel_percent, r_rel_deg_per_100m
-        As in reports; None where the table has none.
+        As in reports; None if the table has none.
     is_lost
         Whether the paper marks the sequence as lost.
     """

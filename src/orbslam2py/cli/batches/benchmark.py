@@ -102,7 +102,7 @@ benchmark.__doc__ = f"{benchmark.__doc__}\n{EXAMPLE}"
 
 
 def _table(done: BenchmarkResult) -> Table:
-    """A line a figure: narrow enough for a terminal with all systems beside each other."""
+    """Return one line for each figure: a terminal has room for all systems side by side."""
     entries, figures = done.entries, figures_of(done.kind)
     systems = [s for s in SYSTEMS if any(has_published(entries, s, one) for one in figures)]
     table = Table(title=f"{done.kind.full_name}: {number_of(len(done.batch.rows), 'run')}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The table that a batch ends with: a row for all seeds of a run, a column for what differs."""
+"""The table at the end of a batch: a row for all seeds of a run, a column per difference."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ class _Column:
 
 
 def printed_table(done: BatchResult, width: int) -> Table:
-    """Make the table of a batch; what tells its rows apart is there to read at any width.
+    """Make the table of a batch; the columns that distinguish the rows are visible at any width.
 
-    What is the same in all rows is left out: it stands in the files. Where there is no room for a
-    column each, all that differs stands in one, below each other.
+    Values that are equal in all rows are left out; the files contain them. If there is not enough
+    room, all differences share one column.
 
     Parameters
     ----------
     done
         The batch.
     width
-        Of the terminal, in characters.
+        Width of the terminal, in characters.
     """
     groups = done.groups
     first = {str(row["setting"]): row for row in reversed(done.rows)}
@@ -83,7 +83,7 @@ def _rows_of(columns: Sequence[_Column]) -> list[tuple[str, ...]]:
 
 # ---- what runs are of ----------------------------------------------------------------------------
 def _differing(rows: Sequence[dict[str, Any]]) -> list[_Column]:
-    """Return the columns that tell rows apart; the sequence if none does."""
+    """Return the columns that distinguish rows; the sequence if none does."""
     names = {name: None for row in rows for name in row if name.startswith(_SWEPT)}
     found = []
     for name in ("sensor", "settings", *names):
@@ -107,14 +107,14 @@ def _column_of(name: str, values: Sequence[Any]) -> _Column:
 
 
 def _text(value: Any) -> str:
-    """Write a value so that no terminal takes a part of it for anything but text."""
+    """Write a value so that a terminal interprets all of it as text."""
     if value is None or isinstance(value, bool):
         return "" if value is None else str(value).lower()
     return "".join(one if one.isprintable() else "\ufffd" for one in printable(str(value)))
 
 
 def _together(columns: Sequence[_Column]) -> _Column:
-    """Put several columns into one, each value with its name but that of the sequence."""
+    """Join several columns, each value with its name except the sequence."""
     if len(columns) == 1:
         return columns[0]
     titles = [column.title for column in columns]
@@ -131,7 +131,7 @@ def _together(columns: Sequence[_Column]) -> _Column:
 
 # ---- what came of them ---------------------------------------------------------------------------
 def _figures(groups: Sequence[Group], *, break_ranges: bool) -> list[_Column]:
-    """Return the columns of figures; without how many runs there are if it is one each."""
+    """Return the columns of figures; without the number of runs if it is always one."""
     counts: list[tuple[str, Iterable[int]]] = []
     if any(group.n_runs > 1 for group in groups):
         counts.append(("runs", (group.n_runs for group in groups)))
@@ -155,7 +155,7 @@ def _figures(groups: Sequence[Group], *, break_ranges: bool) -> list[_Column]:
 
 
 def _spread(spread: Spread | None, digits: int, factor: float, between: str) -> str:
-    """Median, and the range behind it if there is one."""
+    """Return the median, followed by the range if there is one."""
     if spread is None:
         return ""
     median, least, most = (factor * x for x in (spread.median, spread.least, spread.most))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Many runs on one screen: how far they are, which failed, and what Ctrl-C means to them."""
+"""Many runs on one screen: progress, failures, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _Screen(Progress):
 
 
 def lines_of(working: Mapping[str, str]) -> str:
-    """Say which run each worker makes, a line each."""
+    """Show the present run of each worker, one line each."""
     names = [working[worker] for worker in sorted(working)]
     more = len(names) - _SHOWN_WORKERS
     lines = [f"  {number}  {name}" for number, name in enumerate(names[:_SHOWN_WORKERS], 1)]
@@ -48,17 +48,18 @@ def lines_of(working: Mapping[str, str]) -> str:
 def watched_runs(
     console: Console, errors: Console
 ) -> Iterator[tuple[OnProgress, Watch, threading.Event]]:
-    """Show a bar while runs are made, and what each worker makes.
+    """Show a bar while runs are made, and the present run of each worker.
 
     Parameters
     ----------
     console, errors
-        For what is said, and for what goes wrong.
+        For messages, and for errors.
 
     Yields
     ------
     progress, watch, stop
-        What to call after each run, and when workers make others, and what Ctrl-C sets.
+        Functions to call after each run and at changes of the workers, and the event that Ctrl-C
+        sets.
     """
     log_to(errors, quiet=True)  # what single runs say is in their folders
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
@@ -81,7 +82,7 @@ def watched_runs(
 
 
 def exit_as_it_ended(done: BatchResult, errors: Console) -> None:
-    """End with the exit code of runs that are left or failed; do nothing if all is well."""
+    """End with the exit code if runs remain or failed; otherwise do nothing."""
     if done.n_left:
         verb = "is" if done.n_left == 1 else "are"
         errors.print(

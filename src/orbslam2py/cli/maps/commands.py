@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``orbslam2py map``: what is in map files, whether they are whole, and what they are good for."""
+"""``orbslam2py map``: contents, checks and uses of map files."""
 
 from __future__ import annotations
 

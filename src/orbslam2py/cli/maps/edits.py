@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``orbslam2py map crop``, ``align`` and ``optimize``: another map file of one."""
+"""``orbslam2py map crop``, ``align`` and ``optimize``: make another map file from one."""
 
 from __future__ import annotations
 
@@ -273,7 +273,7 @@ def _check_image_options(
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Show how many images have been read, if there is a terminal to show it on."""
+    """Show how many images have been read, if there is a terminal."""
     console = Console(quiet=quiet)
     columns = (TextColumn("images"), BarColumn(), MofNCompleteColumn())
     with Progress(
@@ -312,7 +312,7 @@ def _where(saved: SavedMap, number: int | None, output: Path) -> str:
 
 
 def _others(saved: SavedMap) -> str:
-    """Say that the other maps of a file stay, if there are any."""
+    """Print that the other maps of a file do not change, if there are any."""
     n = int(map_numbers(saved.contents.keyframes).max())
     return ", the other map as it was" if n == 1 else f", the {n} other maps as they were" * (n > 1)
 

@@ -41,7 +41,7 @@ from orbslam2py.trajectory import Trajectory
 
 
 class ExportFormat(str, Enum):
-    """What a map can be exported as."""
+    """Formats for the export of a map."""
 
     COLMAP = "colmap"
     COLMAP_TEXT = "colmap-text"
@@ -63,7 +63,7 @@ _PATHS = (ExportFormat.TUM, ExportFormat.KITTI, ExportFormat.EUROC)
 
 
 class ExportCommand(typer.core.TyperCommand):
-    """Says where the format belongs to those who give it as an option."""
+    """Tells users who give the format as an option where it belongs."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse ``--format``, which other commands have."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sequence that a map was made of, opened for its images."""
+"""The sequence of a map, opened for its images."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from orbslam2py.runs.feeds import is_sequence
 def open_images(
     saved: SavedMap, images: str, fps: float | None, times: Path | None, split: bool
 ) -> Sequence:
-    """Open what ``--images`` names, with the settings of the map.
+    """Open the sequence of ``--images``, with the settings of the map.
 
     Raises
     ------

@@ -59,7 +59,7 @@ def merge(
 
 
 def described(one: MapsMerged, merged: SavedMap) -> str:
-    """What two maps that became one had in common."""
+    """Describe a merge of two maps."""
     scale = "" if sees_metres(merged.contents) else f", its lengths times {one.scale:.4g}"
     return (
         f"map {one.merged_map} is part of map {one.map_index} now{scale}: keyframe "

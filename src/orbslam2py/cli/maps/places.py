@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Places and times in a map, as they are typed."""
+"""Positions and times in a map, in the form of the command line."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _LINE_OF_TIME, _LINE_OF_POSITION = 4, 6
 
 
 def keyframes_between(contents: MapContents, begin: float | None, end: float | None) -> BoolArray:
-    """Which keyframes, bool (k,), were made between ``--from`` and ``--to``.
+    """Return which keyframes, bool (k,), were made between ``--from`` and ``--to``.
 
     Parameters
     ----------
     contents
         The map.
     begin, end
-        Seconds since its first keyframe; None: its beginning, its end.
+        Seconds since its first keyframe; None: its beginning or end.
 
     Raises
     ------
     MapFileError
-        If there are none, in the terms of these options.
+        If there are none; the message names these options.
     """
     for option, seconds in (("--from", begin), ("--to", end)):
         if seconds is not None and math.isnan(seconds):
@@ -75,12 +75,12 @@ def read_position(option: str, text: str) -> FloatArray:
 
 
 def read_place(contents: MapContents, text: str) -> FloatArray:
-    """Read a position in the map, or where the camera was at a time.
+    """Read a position in the map, or the position of the camera at a time.
 
     Raises
     ------
     MapFileError
-        If it is neither, or the map is not of that time.
+        If it is neither, or the time is not in the map.
     """
     if "," in text:
         return read_position("--between", text)
@@ -94,7 +94,7 @@ def read_place(contents: MapContents, text: str) -> FloatArray:
 
 
 def _camera_at(contents: MapContents, seconds: float) -> FloatArray:
-    """Where the camera was, from the keyframes before and after."""
+    """Return the position of the camera, from the keyframes before and after."""
     times = contents.keyframes.timestamps
     order = np.argsort(times, kind="stable")
     since = times[order] - times[order[0]]

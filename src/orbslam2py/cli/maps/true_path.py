@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ground truth with time stamps, from a file or from what came with a sequence."""
+"""Ground truth with time stamps, from a file or a sequence."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def read_true_path(path: Path, sensor: Sensor) -> Trajectory:
     path
         A file in TUM's format, the folder of a sequence, or a bag.
     sensor
-        What the sequence is opened for.
+        The sensor that the sequence is opened for.
 
     Raises
     ------
     DatasetError
-        If there are none, or they are without time stamps or not of the camera.
+        If there are none, if they have no time stamps, or if they are not of the camera.
     """
     if path.is_dir() or is_recording(path):
         truth = open_sequence(path, sensor).ground_truth()

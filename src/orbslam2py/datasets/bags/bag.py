@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A bag: one file, or the folder of the files that a recording was split into."""
+"""A bag: one file, or the folder of a recording that was split into several files."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Topic:
     kind
         Type of the messages, as in ROS 2.
     encoding
-        How they are serialised: ``ros1`` or ``cdr``; else they cannot be read.
+        Serialisation: ``ros1`` or ``cdr``; others cannot be read.
     n
         Number of messages.
     """
@@ -66,7 +66,7 @@ class Message:
     """Where a message is."""
 
     recorded: int
-    """When it was recorded, nanoseconds."""
+    """Time of recording, nanoseconds."""
     file: int
     """Number of its file."""
     place: Place
@@ -76,7 +76,7 @@ class Message:
 class Bag:
     """The topics of a recording, and their messages by index.
 
-    Nothing but places is kept in memory; files stay open as long as the object lives.
+    Only the positions of messages are kept in memory; files stay open as long as the object exists.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Bag:
     Raises
     ------
     DatasetError
-        If it is no bag, or cannot be read at all.
+        If it is no bag or cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -112,12 +112,12 @@ class Bag:
         ]
 
     def messages(self, topic: Topic) -> list[Message]:
-        """Tell where the messages of a topic are, in the order of recording.
+        """Return the positions of the messages of a topic, in the order of recording.
 
         Raises
         ------
         DatasetError
-            If the bag is damaged there.
+            If the bag is damaged at this position.
         """
         channel = Channel(topic.name, topic.kind, topic.encoding)
         with naming_damage(self.path):
@@ -139,7 +139,7 @@ class Bag:
         return self._files[message.file].read(message.place, most)
 
     def _unpacked(self, path: Path) -> Path:
-        """Return the file, or a copy that is not compressed and goes when the bag does."""
+        """Return the file, or a decompressed copy that is deleted with the bag."""
         if path.suffix != _COMPRESSED:
             return path
         folder = Path(tempfile.mkdtemp(prefix="orbslam2py-bag-"))
@@ -159,7 +159,7 @@ class Bag:
 
 
 def is_bag(path: Path) -> bool:
-    """Tell whether a path is a file of a bag by its name, or a folder with such files."""
+    """Return whether a path is a file of a bag by its name, or a folder with such files."""
     if path.is_dir():
         return ((path / _METADATA).is_file() and _INFORMATION in _text(path / _METADATA)) or bool(
             _files_in(path)
@@ -209,7 +209,7 @@ def _files_of(path: Path, doubts: list[str]) -> list[Path]:
 
 
 def _listed_files(folder: Path, doubts: list[str]) -> list[Path]:
-    """Return the files that ``metadata.yaml`` lists, as far as they are there."""
+    """Return the existing files that ``metadata.yaml`` lists."""
     path = folder / _METADATA
     try:
         document: Any = yaml.safe_load(_text(path))

@@ -44,7 +44,7 @@ class CameraInfo:
     Attributes
     ----------
     what
-        Name of the topic, and of the bag, for messages.
+        Names of the topic and of the bag, for messages.
     K, D, R, P
         Raw camera matrix (3, 3) [pixels], raw distortion, rotation (3, 3) from raw to rectified
         coordinates, and rectified projection (3, 4).
@@ -64,14 +64,15 @@ class CameraInfo:
 
     @classmethod
     def of(cls, message: Any, what: str, *, inverse: bool = False) -> CameraInfo | None:
-        """Read a message of ROS 1 or ROS 2; None if the camera was not calibrated.
+        """Read a CameraInfo of ROS 1 or ROS 2; None if the camera was not calibrated.
 
         Parameters
         ----------
         message, what
-            The message, and its name for messages to the user.
+            The message, and its name for error messages.
         inverse
-            Whether its distortion leads from distorted to undistorted points, whatever it says.
+            Whether its distortion maps distorted points to undistorted ones, against its
+            description.
         """
         K, D, R, P = (
             np.asarray(getattr(message, name, getattr(message, name.lower(), [])), np.float64)
@@ -91,7 +92,7 @@ class CameraInfo:
 
     @property
     def is_undistorted(self) -> bool:
-        """Whether raw images are rectified ones as they are."""
+        """Whether raw images are already rectified."""
         same_K = not self.P[0, 0] or np.allclose(self.P[:, :3], self.K, rtol=0, atol=1e-6)
         return not self.D.any() and np.allclose(self.R, np.eye(3), rtol=0, atol=1e-9) and same_K
 
@@ -102,7 +103,7 @@ class CameraInfo:
 
     @property
     def is_fisheye(self) -> bool:
-        """Whether raw images are those of an equidistant (Kannala-Brandt) lens."""
+        """Whether the lens of the raw images is equidistant (Kannala-Brandt)."""
         return self.model in _FISHEYES
 
     @property
@@ -116,7 +117,7 @@ class CameraInfo:
         Raises
         ------
         DatasetError
-            If there are fewer numbers, or more that are not 0.
+            If there are fewer numbers, or further numbers that are not 0.
         """
         if self.D.size < 4 or self.D[4:].any():
             raise DatasetError(
@@ -169,7 +170,7 @@ def settings_of_camera(
     fps
         Images per second.
     rectified
-        Whether the images are rectified ones.
+        Whether the images are rectified.
     depth_factor
         RGB-D: units of the depth images per metre.
 
@@ -201,7 +202,7 @@ def settings_of_pair(
     rectified: bool,
     T_right_left: FloatArray | None = None,
 ) -> Settings:
-    """Make settings for a pair: of its images as they are, or with the rectification of both.
+    """Make settings for a pair: of rectified images, or with the rectification of raw ones.
 
     Parameters
     ----------
@@ -210,15 +211,15 @@ def settings_of_pair(
     fps
         Images per second.
     rectified
-        Whether the images are rectified ones.
+        Whether the images are rectified.
     T_right_left
-        Transform (4, 4) from left to right camera coordinates [m], for calibrations that do not
-        tell the distance of the cameras themselves.
+        Transform (4, 4) from left to right camera coordinates [m], for calibrations without a
+        baseline.
 
     Raises
     ------
     DatasetError
-        If the two do not tell where the cameras are to each other.
+        If the relative pose of the two cameras is not known.
     """
     bf = float(left.P[0, 3] - right.P[0, 3])
     if not bf:
@@ -250,7 +251,7 @@ def _settings_by_transform(
     *,
     rectified: bool,
 ) -> Settings:
-    """Make settings for two cameras that were each calibrated alone, by where they stand."""
+    """Make settings for two cameras that were calibrated separately, by their relative pose."""
     T = np.eye(4) if T_right_left is None else T_right_left.copy()
     if rectified:  # images of one camera may have been turned when they were rectified
         T[:3, 3] = right.R @ T[:3, 3]
@@ -357,8 +358,8 @@ def _pinhole(K: FloatArray, size: tuple[int, int]) -> dict[str, Any]:
 def inverted_distortion(K: FloatArray, D: FloatArray, size: tuple[int, int]) -> FloatArray:
     """Find k1, k2, p1, p2, k3 that lead to distorted points, for numbers that lead away from them.
 
-    The numbers of the RealSense SDK's "Inverse Brown Conrady" make undistorted points of distorted
-    ones. What makes distorted points of undistorted ones is linear in its coefficients.
+    The numbers of the RealSense SDK's "Inverse Brown Conrady" map distorted points to undistorted
+    ones. The model in the other direction is linear in its coefficients.
     """
     u, v = np.meshgrid(*(np.linspace(0, n - 1, _SAMPLES) for n in size))
     seen_x, seen_y = (u.ravel() - K[0, 2]) / K[0, 0], (v.ravel() - K[1, 2]) / K[1, 1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether depth is that of the colour camera; if not, from which camera it is."""
+"""Whether depth belongs to the colour camera, or else to which camera."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _REMEDY_OF_SDK = (
 
 @dataclass(frozen=True, eq=False)
 class DepthCamera:
-    """A camera of depth beside the one of the images.
+    """A depth camera beside the camera of the images.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class DepthCamera:
     T_colour_depth: FloatArray
 
     def registration(self, settings: Settings, size: tuple[int, int]) -> DepthRegistration:
-        """Make what registers its images to those of the camera of the settings.
+        """Make a registration of its images to those of the camera of the settings.
 
         Parameters
         ----------
@@ -72,26 +72,26 @@ class DepthCamera:
 def find_depth_camera(
     bag: Bag, topics: Chosen, frames: tuple[str, str], chosen: Settings | None
 ) -> DepthCamera | None:
-    """Find the camera that depth must be registered from.
+    """Find the camera of the depth images, if they must be registered.
 
     Parameters
     ----------
     bag, topics
         The bag, and the topics of a run with depth.
     frames
-        Coordinates that stand in the heads of images and depth.
+        Frame ids in the headers of images and depth.
     chosen
         Settings that the user gave.
 
     Returns
     -------
     DepthCamera or None
-        None if depth is that of the images' camera, or nothing says otherwise.
+        None if depth belongs to the camera of the images, or if nothing contradicts this.
 
     Raises
     ------
     DatasetError
-        If depth is that of another camera, and the bag does not tell how to register it.
+        If depth belongs to another camera, and the bag has no transform between the two.
     """
     images, depth = topics.left, topics.depth
     if depth is None:
@@ -168,7 +168,7 @@ def _difference(
     depth_info: CameraInfo | None,
     chosen: Settings | None,
 ) -> str:
-    """Say in what the two cameras differ; nothing if they do not, or nobody knows."""
+    """Return the difference of the two cameras; empty if there is none or it is not known."""
     if images.size != depth.size and images.size and depth.size:
         problem = depth_size_problem(depth.size[::-1], images.size[::-1])
         if says_registered(depth) and problem is None:
@@ -190,7 +190,7 @@ def _difference(
 
 
 def _in_one_place(T: FloatArray, info: CameraInfo) -> bool:
-    """Whether a pixel of one camera is, at all usual distances, the same one of the other."""
+    """Return whether a pixel of one camera is the same pixel of the other at usual distances."""
     fx = info.K[0, 0]
     apart = np.linalg.norm(T[:3, 3]) / _NEAR
     turned = np.abs(T[:3, :3] - np.eye(3)).max()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a topic with images is: its pixels, and what its name tells of the camera."""
+"""A topic with images: its pixels, and the camera that its name tells."""
 
 from __future__ import annotations
 
@@ -46,24 +46,24 @@ class ImageTopic:
 
     @property
     def is_depth(self) -> bool:
-        """Whether its pixels are distances."""
+        """Whether its pixels are depths."""
         return is_depth(self.encoding, self.topic.name)
 
     @property
     def base(self) -> str:
-        """Name without the way of sending it."""
+        """Name without the transport."""
         name, _, last = self.topic.name.rpartition("/")
         return name if last in _TRANSPORTS and name else self.topic.name
 
     @property
     def camera(self) -> str:
-        """Name that the images of one camera share."""
+        """Common part of the names of one camera's images."""
         name, _, last = self.base.rpartition("/")
         return name or "/" if last in _OF_ONE_CAMERA else self.base
 
     @property
     def is_rectified(self) -> bool:
-        """Whether the name says so."""
+        """Whether the name contains this word."""
         return "rect" in self.base.rpartition("/")[2]
 
     def __str__(self) -> str:

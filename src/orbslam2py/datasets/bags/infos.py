@@ -29,7 +29,7 @@ def read_info(bag: Bag, image: ImageTopic, topic: Topic | None, role: str) -> Ca
     topic
         Its CameraInfo; None if it has none.
     role
-        By which the topic may be named, for messages.
+        Names that the user may give to the topic, for messages.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What reads messages and compressed parts of bags: rosbags, and what it brings along."""
+"""The libraries that read messages and compressed parts of bags: rosbags and its dependencies."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
 
 
 def require(name: str) -> Any:
-    """Import a module of rosbags or of what it needs.
+    """Import a module of rosbags or of its dependencies.
 
     Raises
     ------
     DatasetError
-        If it is not installed, with the line that installs it.
+        If it is not installed, with the command that installs it.
     """
     try:
         return importlib.import_module(name)
@@ -39,7 +39,7 @@ def lz4_decompress(content: bytes) -> bytes:
 
 
 def zstd_decompress(content: bytes, most: int | None = None) -> bytes:
-    """Decompress Zstandard data, or so much that the first bytes are known.
+    """Decompress Zstandard data, completely or only the first bytes.
 
     Raises
     ------
@@ -56,12 +56,12 @@ def zstd_decompress(content: bytes, most: int | None = None) -> bytes:
 
 
 def unpack_zstd(packed: BinaryIO, target: BinaryIO) -> str | None:
-    """Decompress a file of Zstandard data, as far as that goes.
+    """Decompress a file of Zstandard data, as much as is intact.
 
     Returns
     -------
     str or None
-        What is wrong with the data, such as ``is cut off``; None if they were whole.
+        What is wrong with the data, such as ``is cut off``; None if they were complete.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""MCAP files: records with a length each, messages in chunks or between them.
+"""MCAP files: records with their lengths, messages in chunks or between them.
 
-The format is described at https://mcap.dev/spec. The summary at the end is not needed: chunks are
-followed by indices of their messages, and where these are missing the chunk is gone through, so
-that a recording that was cut off is read as far as it goes.
+The format is described at https://mcap.dev/spec. The summary at the end is not needed: an index of
+the messages follows each chunk. If it is missing, the chunk itself is searched. So an incomplete
+recording is read up to its end.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ class McapFile:
         self._walk()
 
     def counts(self) -> dict[Channel, int]:
-        """Tell the channels and how many messages each has."""
+        """Return the channels and their numbers of messages."""
         return count_messages(self._channels, self._entries)
 
     def places(self, channel: Channel) -> list[Place]:
-        """Tell where the messages of a channel lie, in the order of recording."""
+        """Return the positions of the messages of a channel, in the order of recording."""
         entries = entries_of(channel, self._channels, self._entries)
         return sorted(place for entry in entries if (place := self._place(*entry)) is not None)
 
@@ -168,7 +168,7 @@ class McapFile:
         self._channels[number] = Channel(normal_topic(topic), kind, encoding)
 
     def _go_through(self, chunk: int, *, declarations_only: bool = False) -> None:
-        """Take what an index would tell from the chunk itself."""
+        """Read the index entries from the chunk itself."""
         try:
             content = self._cache[chunk]
         except DatasetError as error:
@@ -182,7 +182,7 @@ class McapFile:
                 self._entries.setdefault(number, []).append((recorded, chunk, position))
 
     def _place(self, recorded: int, chunk: int, position: int) -> Place | None:
-        """Find the message behind the head of its record; None if it was cut off."""
+        """Find the message after the header of its record; None if it is incomplete."""
         if chunk >= 0 and self._chunks[chunk].compression == "":
             end = self._chunks[chunk].position + self._chunks[chunk].size
             position, chunk = position + self._chunks[chunk].position, -1
@@ -211,7 +211,7 @@ class McapFile:
 
 
 def _texts(data: bytes, position: int, count: int) -> list[str]:
-    """Read texts that stand one behind the other, each after its length."""
+    """Read consecutive texts, each after its length."""
     texts = []
     for _ in range(count):
         size = _U32.unpack_from(data, position)[0]
@@ -221,7 +221,7 @@ def _texts(data: bytes, position: int, count: int) -> list[str]:
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, int, int]]:
-    """Yield the whole records of a chunk: where each begins, its operation, and its data."""
+    """Yield the complete records of a chunk: position, operation, and data."""
     position = 0
     while position + _LEAD.size <= len(content):
         operation, size = _LEAD.unpack_from(content, position)

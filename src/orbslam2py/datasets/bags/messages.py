@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages of ROS as Python objects: heads of images at once, the rest through rosbags."""
+"""Messages of ROS as Python objects: headers of images at once, the rest by rosbags."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _NANO = 10**9
 
 @dataclass(frozen=True)
 class Head:
-    """What the first bytes of an image tell.
+    """The contents of the first bytes of an image message.
 
     Attributes
     ----------
     stamp
-        When it was taken, nanoseconds; 0 if the driver did not tell.
+        Time of the image, nanoseconds; 0 if the driver gave none.
     frame
-        Name of the camera's coordinates.
+        Frame id of the camera.
     size
         Width and height in pixels; None if the image is compressed.
     """
@@ -50,7 +50,7 @@ class Head:
 
 
 def read_head(content: bytes, kind: str, encoding: str) -> Head:
-    """Read the head of an image message.
+    """Read the header of an image message.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def read_head(content: bytes, kind: str, encoding: str) -> Head:
     Raises
     ------
     DatasetError
-        If it is too short; without the bag's name.
+        If it is too short; the message does not name the bag.
     """
     # ROS 1: sequence number, seconds, nanoseconds, text. CDR: four bytes that tell the byte order,
     # the same without the number; the text ends with 0, and numbers are aligned to their size.
@@ -102,7 +102,7 @@ def read_message(content: bytes, kind: str, encoding: str, store: Any = None) ->
     Raises
     ------
     DatasetError
-        If it is damaged; without the bag's name.
+        If it is damaged; the message does not name the bag.
     """
     serde = require("rosbags.serde")
     kind = TRANSFORMS[0] if kind in TRANSFORMS else kind

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A file that several threads may read from at any place."""
+"""A file that several threads may read at any position."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from orbslam2py.errors import DatasetError
 
 
 class OpenFile:
-    """Reads parts of a file; open as long as the object lives.
+    """Reads parts of a file; it is open as long as the object exists.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class OpenFile:
         self.size = os.fstat(self._descriptor).st_size
 
     def read(self, position: int, size: int) -> bytes:
-        """Read `size` bytes from `position` on, fewer where the file ends.
+        """Read `size` bytes from `position` on, fewer at the end of the file.
 
         Raises
         ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the files of all kinds of bags have in common: topics, where messages lie, chunks."""
+"""Common parts of all kinds of bags: topics, positions of messages, chunks."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ _KEPT_CHUNKS = 4
 
 @dataclass(frozen=True)
 class Channel:
-    """Messages of one type under one name, as a file declares them.
+    """Messages of one type and name, as a file declares them.
 
     Attributes
     ----------
     topic
-        Its name, with a ``/`` before it.
+        Name of the topic, with a ``/`` before it.
     kind
         Type of the messages, as in ROS 2: ``sensor_msgs/msg/Image``.
     encoding
-        How they are serialised: ``ros1``, ``cdr``, or something else.
+        Serialisation: ``ros1``, ``cdr``, or another one.
     """
 
     topic: str
@@ -44,7 +44,7 @@ class Channel:
 
 
 class Place(NamedTuple):
-    """Where a message lies in its file; what the numbers mean is the file's own business."""
+    """Position of a message in its file; only the file's own class uses the numbers."""
 
     #: When it was recorded, nanoseconds.
     recorded: int
@@ -62,17 +62,17 @@ class BagFile(Protocol):
     Attributes
     ----------
     doubts
-        What is wrong with the file although it can be read: sentences without the file's name.
+        Faults of the file that do not prevent reading: sentences without the file's name.
     """
 
     doubts: list[str]
 
     def counts(self) -> dict[Channel, int]:
-        """Tell the channels and how many messages each has."""
+        """Return the channels and their numbers of messages."""
         ...
 
     def places(self, channel: Channel) -> list[Place]:
-        """Tell where the messages of a channel lie, in the order of recording."""
+        """Return the positions of the messages of a channel, in the order of recording."""
         ...
 
     def read(self, place: Place, most: int | None = None) -> bytes:
@@ -82,7 +82,7 @@ class BagFile(Protocol):
 
 @contextlib.contextmanager
 def naming_damage(path: Path) -> Iterator[None]:
-    """Turn whatever damaged bytes lead to into an error that names the file.
+    """Turn any error of damaged bytes into an error that names the file.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def naming_damage(path: Path) -> Iterator[None]:
     Raises
     ------
     DatasetError
-        In the place of what comes of wrong bytes; one that names the file already comes through.
+        In place of any error of damaged bytes; an error that names the file is not changed.
     """
     try:
         yield
@@ -107,13 +107,13 @@ def naming_damage(path: Path) -> Iterator[None]:
 
 
 def normal_kind(kind: str) -> str:
-    """Name a type as ROS 2 does today: ``sensor_msgs/Image`` is ``sensor_msgs/msg/Image``."""
+    """Return the name of a type in today's ROS 2, such as ``sensor_msgs/msg/Image``."""
     package, _, rest = kind.partition("/")
     return kind if not rest or "/" in rest else f"{package}/msg/{rest}"
 
 
 def normal_topic(topic: str) -> str:
-    """Name a topic with one ``/`` before each part."""
+    """Return the name of a topic with one ``/`` before each part."""
     return "/" + "/".join(part for part in topic.split("/") if part)
 
 
@@ -123,7 +123,7 @@ class ChunkCache:
     Parameters
     ----------
     load
-        Reads and decompresses the chunk of a number.
+        Reads and decompresses the chunk with a number.
     """
 
     def __init__(self, load: Callable[[int], bytes]) -> None:
@@ -149,7 +149,7 @@ def decompress(content: bytes, compression: str) -> bytes:
     Raises
     ------
     DatasetError
-        If it is damaged, or compressed in an unknown way; without the file's name.
+        If it is damaged, or its compression is unknown; the message does not name the file.
     """
     try:
         if compression in ("", "none"):
@@ -170,7 +170,7 @@ def decompress(content: bytes, compression: str) -> bytes:
 def count_messages(
     channels: Mapping[int, Channel], entries: Mapping[int, Sequence[object]]
 ) -> dict[Channel, int]:
-    """Tell how many messages each channel has; a file may declare one under several numbers."""
+    """Return each channel's number of messages; a file may declare a channel several times."""
     counts: dict[Channel, int] = {}
     for number, channel in channels.items():
         counts[channel] = counts.get(channel, 0) + len(entries.get(number, ()))
@@ -180,6 +180,6 @@ def count_messages(
 def entries_of(
     channel: Channel, channels: Mapping[int, Channel], entries: Mapping[int, Sequence[EntryT]]
 ) -> list[EntryT]:
-    """Tell what a file lists of a channel, under all numbers that it has."""
+    """Return the entries of a channel in a file, under all of its numbers."""
     numbers = [number for number, one in channels.items() if one == channel]
     return [entry for number in numbers for entry in entries.get(number, ())]

@@ -48,7 +48,7 @@ _DEPTH_HEAD = struct.Struct("<iff")
 
 
 def is_depth(encoding: str, topic: str) -> bool:
-    """Tell whether pixels are distances: mono16 are grey values unless the topic's name says so."""
+    """Return whether pixels are depths: mono16 is grey unless the topic's name says depth."""
     base = base_encoding(encoding)
     return base in _DEPTHS and (base != "mono16" or "depth" in topic.lower())
 
@@ -59,9 +59,9 @@ def units_per_metre(encoding: str) -> float:
 
 
 def base_encoding(text: str) -> str:
-    """Return the encoding of raw pixels, also of those that were compressed.
+    """Return the encoding of the pixels, also of compressed ones.
 
-    ``16UC1; compressedDepth png`` is ``16UC1``; a mere ``jpeg`` or ``png`` is ``bgr8``.
+    ``16UC1; compressedDepth png`` is ``16UC1``; ``jpeg`` or ``png`` alone is ``bgr8``.
     """
     first = text.partition(";")[0].strip()
     return first if first in _SEEN or first in _DEPTHS else "bgr8" if _is_packed(text) else first
@@ -78,7 +78,7 @@ def decode_image(
     rgb: bool,
     to_8_bits: Callable[[NDArray[np.generic]], ByteArray],
 ) -> ByteArray:
-    """Decode an image for eyes.
+    """Decode a grey or colour image.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def decode_image(
     compressed
         Which of the two.
     rgb
-        Whether colour is wanted in the order RGB (True) or BGR.
+        Whether the order of colours is RGB (True) or BGR.
     to_8_bits
         Scales images of 16 bits.
 
@@ -99,7 +99,7 @@ def decode_image(
     Raises
     ------
     ImageError
-        If it is damaged, or not for eyes; without the bag's name.
+        If it is damaged, or no grey or colour image; the message does not name the bag.
     """
     pixels = decode_pixels(message, compressed=compressed)
     image = to_8_bits(pixels) if pixels.dtype == np.uint16 else np.asarray(pixels, dtype=np.uint8)
@@ -109,12 +109,12 @@ def decode_image(
 
 
 def decode_pixels(message: Any, *, compressed: bool) -> NDArray[np.generic]:
-    """Decode an image for eyes as it is: uint8 or uint16, (h, w) or (h, w, 3) in the order BGR.
+    """Decode a grey or colour image: uint8 or uint16, (h, w) or (h, w, 3) in the order BGR.
 
     Raises
     ------
     ImageError
-        If it is damaged, or not for eyes; without the bag's name.
+        If it is damaged, or no grey or colour image; the message does not name the bag.
     """
     if not compressed:
         return _raw_image(message)
@@ -130,7 +130,7 @@ def decode_depth(message: Any, *, compressed: bool) -> NDArray[np.generic]:
     Raises
     ------
     ImageError
-        If it is damaged, or no depth; without the bag's name.
+        If it is damaged, or no depth image; the message does not name the bag.
     """
     if compressed:
         return _packed_depth(message.data.tobytes(), str(message.format))
@@ -176,7 +176,7 @@ def _rows(message: Any, kind: np.dtype[Any], channels: int) -> NDArray[np.generi
 
 
 def _packed_depth(content: bytes, form: str) -> NDArray[np.generic]:
-    """Unpack ``compressedDepth``: a head, then a PNG of depth or of scaled inverse depth."""
+    """Decode ``compressedDepth``: a header, then a PNG of depth or of scaled inverse depth."""
     encoding = base_encoding(form)
     if "compressedDepth" not in form:
         decoded = decode_any(content, "the message")  # a plain PNG of 16 bits

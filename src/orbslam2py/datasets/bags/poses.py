@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""True poses that were recorded in a bag."""
+"""Ground truth that was recorded in a bag."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def read_poses(bag: Bag, topic: Topic) -> Trajectory:
     Raises
     ------
     DatasetError
-        If there are none that make sense.
+        If there are no valid poses.
     """
     found: dict[int, list[float]] = {}
     for message in bag.messages(topic):
@@ -53,7 +53,7 @@ def read_poses(bag: Bag, topic: Topic) -> Trajectory:
 
 
 def pose_of_numbers(*numbers: float) -> FloatArray:
-    """Make a transform (4, 4) of x, y, z and a quaternion x, y, z, w; NaN if they are none."""
+    """Make a transform (4, 4) of x, y, z and a quaternion x, y, z, w; NaN if they are invalid."""
     if not np.isfinite(numbers).all() or not any(numbers[3:]):
         return np.full((4, 4), np.nan)
     table = np.array([numbers])

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the RealSense Viewer and SDK write beside the images of a stream.
+"""The data that the RealSense Viewer and SDK write beside the images of a stream.
 
-Up to SDK 2.58 that is a bag of ROS 1, from 2.59 on an SQLite file of ROS 2 without metadata.yaml.
-All of a stream stands under one name, ``/device_0/sensor_1/Color_0``: ``/image/data`` (or
-``/image/data/compressed``), the calibration, and under ``/tf`` where it is to a reference of its
-device. Messages of SQLite files carry times of arrival; the times of the camera stand in texts of
-``/image/metadata``.
+Up to SDK 2.58 the file is a bag of ROS 1, from 2.59 on an SQLite file of ROS 2 without
+metadata.yaml. The topics of a stream have a common prefix, ``/device_0/sensor_1/Color_0``: images
+in ``/image/data`` (or ``/image/data/compressed``), the calibration, and in ``/tf`` the transform to
+a reference of the device. Messages of SQLite files have times of arrival; the times of the camera
+are in texts of ``/image/metadata``.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _NANO_PER_MILLI = 10**6
 
 
 def stream_of(image: ImageTopic) -> str | None:
-    """Return the name of the stream that images belong to; None if they are not of the SDK."""
+    """Return the name of the stream that images belong to; None if the SDK did not write them."""
     match = _STREAM.match(image.topic.name)
     return None if match is None else match[0]
 
 
 def read_extrinsics(bag: Bag) -> Iterator[tuple[str, str, FloatArray]]:
-    """Yield where the streams of a bag are.
+    """Yield the poses of the streams of a bag.
 
     Yields
     ------
@@ -63,19 +63,19 @@ def read_extrinsics(bag: Bag) -> Iterator[tuple[str, str, FloatArray]]:
 def camera_times(
     bag: Bag, images: list[ImageTopic], timed: list[TimedMessages]
 ) -> list[TimedMessages]:
-    """Put the times of the camera in the place of times of arrival, where the SDK wrote those.
+    """Replace times of arrival by times of the camera, if the SDK wrote those.
 
     Parameters
     ----------
     bag
         The bag.
     images, timed
-        Streams, and their messages by the stamps in them.
+        Streams, with their messages by their stamps.
 
     Returns
     -------
     list of TimedMessages
-        As they were given, if the bag has no other times for all streams by one clock.
+        Unchanged, if the bag does not have other times by one clock for all streams.
     """
     of_sdk = [one for one in images if stream_of(one) and one.topic.encoding == "cdr"]
     if len(of_sdk) < len(images):
@@ -112,7 +112,7 @@ def camera_times(
 
 
 def units_per_metre_of(bag: Bag, depth: ImageTopic) -> float | None:
-    """Return the units of depth per metre that the SDK wrote down; None if it did not."""
+    """Return the units of depth per metre in the file; None if the SDK did not write them."""
     match = _STREAM.match(depth.topic.name)
     if match is None:
         return None
@@ -130,7 +130,7 @@ def units_per_metre_of(bag: Bag, depth: ImageTopic) -> float | None:
 
 
 def is_inverse(bag: Bag, image: ImageTopic) -> bool:
-    """Tell whether the SDK says that a calibration has the inverse of the usual distortion."""
+    """Return whether a calibration has the inverse distortion of the SDK."""
     stream = stream_of(image)
     topics = (one for one in bag.topics if one.name == f"{stream}/camera_info")
     told = (m for one in topics if one.kind == _STRING for m in _messages(bag, one)[:1])
@@ -169,7 +169,7 @@ def _camera_stamps(bag: Bag, data: str) -> dict[int, tuple[str, int]]:
 
 
 def _retimed(timed: TimedMessages, stamps: dict[int, int]) -> TimedMessages:
-    """Give messages other stamps, by their times of recording; those without one are left out."""
+    """Give messages new stamps, by their times of recording; leave out those without one."""
     found: dict[int, Message] = {}
     for message in timed.messages:
         if message.recorded in stamps:
@@ -179,7 +179,7 @@ def _retimed(timed: TimedMessages, stamps: dict[int, int]) -> TimedMessages:
 
 
 def _messages(bag: Bag, topic: Topic) -> list[Any]:
-    """Messages of a topic with few of them, as far as they can be read."""
+    """Yield the readable messages of a topic with few messages."""
     if topic.encoding not in ENCODINGS:
         return []
     found = []
@@ -192,7 +192,7 @@ def _messages(bag: Bag, topic: Topic) -> list[Any]:
 
 
 def _extrinsics_of(message: Any) -> FloatArray:
-    """Read ``T_stream_reference`` (4, 4) of a message; NaN if it holds none."""
+    """Read ``T_stream_reference`` (4, 4) of a message; NaN if it has none."""
     if hasattr(message, "translation"):
         at, turned = message.translation, message.rotation
         return pose_of_numbers(at.x, at.y, at.z, turned.x, turned.y, turned.z, turned.w)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bags of ROS 1, version 2.0: one record after the other, messages in chunks.
+"""Bags of ROS 1, version 2.0: records in sequence, messages in chunks.
 
 The format is described at https://wiki.ros.org/Bags/Format/2.0. The index at the end is not needed:
-each chunk is followed by its own, and where that is missing too the chunk is gone through, so that
-a recording that was cut off is read as far as it goes.
+an index of its messages follows each chunk. If it is missing, the chunk itself is searched. So an
+incomplete recording is read up to its end.
 """
 
 from __future__ import annotations
@@ -79,11 +79,11 @@ class Ros1File:
         self._walk()
 
     def counts(self) -> dict[Channel, int]:
-        """Tell the channels and how many messages each has."""
+        """Return the channels and their numbers of messages."""
         return count_messages(self._channels, self._entries)
 
     def places(self, channel: Channel) -> list[Place]:
-        """Tell where the messages of a channel lie, in the order of recording."""
+        """Return the positions of the messages of a channel, in the order of recording."""
         entries = entries_of(channel, self._channels, self._entries)
         return sorted(place for entry in entries if (place := self._place(entry)) is not None)
 
@@ -129,7 +129,7 @@ class Ros1File:
                 self._go_through(number, connections_only=True)
 
     def _head(self, position: int) -> tuple[dict[bytes, bytes], int, int] | None:
-        """Fields of the record at a position, where its data are, and how long; None at the end."""
+        """Return fields, data position and size of the record at a position; None at the end."""
         lead = self._file.read(position, 4)
         length = _U32.unpack(lead)[0] if len(lead) == 4 else 0
         content = self._file.read(position + 4, length + 4) if length <= _LONGEST_HEAD else b""
@@ -165,7 +165,7 @@ class Ros1File:
             entries.append(_Entry(seconds * 10**9 + nanoseconds, chunk, offset))
 
     def _go_through(self, chunk: int, *, connections_only: bool = False) -> None:
-        """Take what an index would tell from the chunk itself."""
+        """Read the index entries from the chunk itself."""
         try:
             content = self._cache[chunk]
         except DatasetError as error:
@@ -181,7 +181,7 @@ class Ros1File:
                 self._entries.setdefault(_U32.unpack(fields[b"conn"])[0], []).append(entry)
 
     def _place(self, entry: _Entry) -> Place | None:
-        """Find the message behind the head of its record; None if it was cut off."""
+        """Find the message after the header of its record; None if it is incomplete."""
         chunk = self._chunks[entry.chunk]
         is_open = chunk.compression == "none"
         base = chunk.position if is_open else 0
@@ -214,7 +214,7 @@ class Ros1File:
 
 
 def _fields(content: bytes) -> dict[bytes, bytes]:
-    """Split the head of a record into ``name=value``; what does not fit is left out."""
+    """Split the header of a record into ``name=value``; other parts are ignored."""
     fields, position = {}, 0
     while position + 4 <= len(content):
         size = _U32.unpack_from(content, position)[0]
@@ -227,7 +227,7 @@ def _fields(content: bytes) -> dict[bytes, bytes]:
 
 
 def _records(content: bytes) -> Iterator[tuple[int, dict[bytes, bytes], int, int]]:
-    """Yield the whole records of a chunk: where each begins, its fields, and its data."""
+    """Yield the complete records of a chunk: position, fields, and data."""
     position = 0
     while position + 4 <= len(content):
         length = _U32.unpack_from(content, position)[0]

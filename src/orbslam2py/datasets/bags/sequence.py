@@ -54,17 +54,16 @@ _USUAL_RATE = 30.0
 class BagSequence(FramesInOrder):
     """The images of a bag; see `datasets.base.Sequence`.
 
-    Images are read when they are asked for, by their place in the file; the bag is never in memory
-    as a whole.
+    Images are read on request; the bag is never completely in memory.
 
     Parameters
     ----------
     path
         A file of ROS 1 (``.bag``) or ROS 2 (``.db3``, ``.mcap``), or the folder of a recording.
     sensor
-        What to deliver images for; by default the richest there are images for.
+        The sensor; by default the richest one that the bag has images for.
     settings
-        Settings, a file, a built-in name, or None for what the CameraInfo of the bag tell.
+        Settings, a file, a built-in name, or None for the CameraInfo of the bag.
     topics
         Names of topics by their roles, as a dictionary or as ``left=/a,right=/b``: ``left`` (or
         ``image``), ``right``, ``depth``, ``left_info`` (or ``info``), ``right_info``,
@@ -73,7 +72,7 @@ class BagSequence(FramesInOrder):
     Raises
     ------
     DatasetError
-        If it is no bag, has no images for the sensor, or its topics cannot be recognised.
+        By default they are chosen by types and names.
     SettingsError
         If the settings given are wrong.
     """
@@ -169,7 +168,7 @@ class BagSequence(FramesInOrder):
         Raises
         ------
         DatasetError
-            If they cannot be read.
+            If the samples cannot be read.
         """
         return read_imu(self._bag)
 
@@ -214,7 +213,7 @@ class BagSequence(FramesInOrder):
 
     @cached_property
     def _registration(self) -> DepthRegistration | None:
-        """What registers depth to the images; None if it is registered."""
+        """Return the registration of depth to the images; None if depth is registered."""
         size = self.topics.left.size
         if self._depth_camera is None or size is None:
             return None
@@ -247,7 +246,7 @@ class BagSequence(FramesInOrder):
         return image
 
     def _sample(self) -> list[NDArray[np.generic]]:
-        """Images of the (left) camera, spread over the bag."""
+        """Return images of the (left) camera, distributed over the bag."""
         one, found = self.topics.left, []
         for index in spread_over(len(self)):
             with contextlib.suppress(ImageError):  # said when the run comes to it

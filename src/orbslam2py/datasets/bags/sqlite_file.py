@@ -36,7 +36,7 @@ class SqliteFile:
     Raises
     ------
     DatasetError
-        If it is no database, or one of something else.
+        If it is no database, or not one of rosbag2.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,11 +58,11 @@ class SqliteFile:
         self._list_messages()
 
     def counts(self) -> dict[Channel, int]:
-        """Tell the channels and how many messages each has."""
+        """Return the channels and their numbers of messages."""
         return count_messages(self._channels, self._entries)
 
     def places(self, channel: Channel) -> list[Place]:
-        """Tell where the messages of a channel lie, in the order of recording."""
+        """Return the positions of the messages of a channel, in the order of recording."""
         entries = entries_of(channel, self._channels, self._entries)
         return [Place(recorded, -1, row, 0) for recorded, row in sorted(entries)]
 
@@ -72,7 +72,7 @@ class SqliteFile:
         Raises
         ------
         DatasetError
-            If the database is damaged there.
+            If the database is damaged at this position.
         """
         try:
             with self._lock:
@@ -145,7 +145,7 @@ class SqliteFile:
             self.doubts.append(f"is damaged: {named} without a name or a type, left out")
 
     def _list_messages(self) -> None:
-        """Note when and in which row each message is, as far as the database can be read."""
+        """Store time and row of each message, as far as the database can be read."""
         query = "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
         untimed = 0
         try:
@@ -166,5 +166,5 @@ class SqliteFile:
 
 
 def _reason(error: Exception) -> str:
-    """What SQLite says, unless it says it with bytes that are no text."""
+    """Return the error of SQLite, without bytes that are no text."""
     return str(error) if isinstance(error, sqlite3.Error) else "malformed database"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Times of the images of a topic, and which images belong together."""
+"""Times of the images of a topic, and pairs of images by time."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class TimedMessages:
     messages
         Where each is.
     sizes
-        How many there are of each size; empty if they are compressed.
+        Number of images of each size; empty if they are compressed.
     frame
-        Name of the camera's coordinates.
+        Frame id of the camera.
     """
 
     nanoseconds: list[int]
@@ -49,20 +49,20 @@ class TimedMessages:
 
     @property
     def seconds(self) -> FloatArray:
-        """Times from the first image on [s]: small numbers keep all digits."""
+        """Return times relative to the first image [s]: small numbers keep all digits."""
         first = self.nanoseconds[0] if self.nanoseconds else 0
         return np.array([stamp - first for stamp in self.nanoseconds], dtype=np.int64) / 1e9
 
     def since(self, other: TimedMessages) -> FloatArray:
-        """Times from the first image of another topic on [s]."""
+        """Return times relative to the first image of another topic [s]."""
         return self.seconds + (self.nanoseconds[0] - other.nanoseconds[0]) / 1e9
 
 
 def time_messages(bag: Bag, topic: Topic) -> TimedMessages:
-    """Read the heads of the images of a topic, and sort these by their stamps.
+    """Read the headers of the images of a topic, and sort the images by their stamps.
 
-    Where the driver set no stamps the times of recording count. Of images with equal stamps the
-    first is taken.
+    Without stamps of the driver, the times of recording are used. Of images with equal stamps the
+    first is used.
 
     Raises
     ------
@@ -130,14 +130,14 @@ def pair_messages(
     path
         The bag, for messages.
     first, second
-        The images; as many as possible of the first get one of the second.
+        The images; as many as possible of the first topic get an image of the second.
     names
         Names of the two topics.
 
     Returns
     -------
     first_indices, second_indices
-        Those that belong together, in the order of time.
+        Pairs of images in the order of time.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def stamps_of(nanoseconds: list[int]) -> Stamps:
 
 
 def warn_of_gaps(path: Path, seconds: FloatArray) -> None:
-    """Log where images are missing for long."""
+    """Log long gaps between images."""
     steps = np.diff(seconds)
     if len(steps) < 2:
         return

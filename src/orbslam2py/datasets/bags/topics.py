@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which topics of a bag are the images: named by the user, or guessed by types and names."""
+"""The topics of a run: named by the user, or chosen by types and names."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Chosen:
     Attributes
     ----------
     left
-        Images of the only, left or colour camera.
+        Images of the single, left or colour camera.
     right, depth
-        Those that belong to them, if the sensor has them.
+        The second images, if the sensor has them.
     left_info, right_info, depth_info
         Calibration of the cameras, if there is one.
     truth
-        True poses of the camera, if there are any.
+        Poses of the ground truth, if there are any.
     """
 
     left: ImageTopic
@@ -66,7 +66,7 @@ def parse_topics(text: str) -> dict[str, str]:
     Raises
     ------
     DatasetError
-        If a part is no pair, or names no role.
+        If a part has no ``=``, or does not name a role.
     """
     named: dict[str, str] = {}
     for part in text.split(","):
@@ -98,7 +98,7 @@ class TopicChoice:
     Raises
     ------
     DatasetError
-        If there are no images, or a topic that was named is not there.
+        If there are no images, or a named topic does not exist.
     """
 
     def __init__(self, bag: Bag, named: Mapping[str, str]) -> None:
@@ -112,7 +112,7 @@ class TopicChoice:
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
-        """Sensors there are images for, as far as that can be told, the richest first."""
+        """Return the sensors that there are images for, as far as known, the richest first."""
         found = []
         if "depth" in self._named or (self._depths and "right" not in self._named):
             found.append(Sensor.RGBD)
@@ -121,12 +121,12 @@ class TopicChoice:
         return (*found, Sensor.MONOCULAR)
 
     def require(self, sensor: Sensor) -> None:
-        """See that images for a sensor are found where there may be some.
+        """Check that there are images for a sensor.
 
         Raises
         ------
         DatasetError
-            If a pair is wanted, and several cameras have names that tell no pair.
+            If a pair is requested, and no names of several cameras form a pair.
         """
         if sensor is Sensor.STEREO and sensor not in self.sensors and len(self._cameras) > 1:
             raise self._not_certain("the left and right images", "left", "right")
@@ -137,7 +137,7 @@ class TopicChoice:
         Raises
         ------
         DatasetError
-            If it cannot be told, with all images there are and their types.
+            If the choice is not clear, with a list of all images and their types.
         """
         right: ImageTopic | None = None
         depth: ImageTopic | None = None
@@ -165,7 +165,7 @@ class TopicChoice:
 
     @cached_property
     def _cameras(self) -> list[ImageTopic]:
-        """Images for eyes, the best of each camera."""
+        """Return grey or colour images, the best topic of each camera."""
         best: dict[str, ImageTopic] = {}
         for one in self._all:
             if one.size is None or one.is_depth:
@@ -334,7 +334,7 @@ class TopicChoice:
         )
 
     def _examples(self, roles: tuple[str, ...]) -> dict[str, str]:
-        """Topics that may be meant by roles; ``/...`` where there is none."""
+        """Return the possible topics for roles; ``/...`` if there is none."""
         coloured = [one for one in self._cameras if _COLOUR.search(one.base)]
         registered = [one for one in self._depths if _REGISTERED.search(one.base)]
         pair = self._pairs[0] if self._pairs else tuple(self._cameras[:2])
@@ -353,7 +353,7 @@ class TopicChoice:
 
 
 def own_info(bag: Bag, image: ImageTopic) -> Topic | None:
-    """Find the CameraInfo beside a topic of images by its name; None if there is none."""
+    """Find the CameraInfo of a topic of images by its name; None if there is none."""
     parent = image.base.rpartition("/")[0]
     stream = parent.rpartition("/")[0]  # as recordings of RealSense cameras have it
     wanted = [
@@ -365,7 +365,7 @@ def own_info(bag: Bag, image: ImageTopic) -> Topic | None:
 
 
 def says_registered(depth: ImageTopic) -> bool:
-    """Whether the name of a topic says that its depth is registered to images."""
+    """Return whether the name of a topic says that its depth is registered to images."""
     return _REGISTERED.search(depth.base) is not None
 
 

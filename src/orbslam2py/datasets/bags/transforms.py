@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where cameras are to each other: the transforms that a bag holds."""
+"""Relative poses of cameras: the transforms of a bag."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ _FIXED = 1e-4
 
 
 class Transforms:
-    """The transforms between frames that do not move to each other.
+    """The constant transforms between frames.
 
-    They are taken from ``/tf_static``, from ``/tf`` where they stay the same, and from what the
-    RealSense SDK writes beside its streams.
+    They come from ``/tf_static``, from ``/tf`` if they are constant, and from the data of the
+    RealSense SDK beside its streams.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Transforms:
         Returns
         -------
         FloatArray or None
-            ``T_target_source`` (4, 4) [m]; None if the bag does not tell it.
+            ``T_target_source`` (4, 4) [m]; None if the bag does not contain it.
         """
         for one in target:
             for other in source:
@@ -128,7 +128,7 @@ class Transforms:
         self._edges.setdefault(source, {})[target] = inverse_poses(T)
 
     def _add_fixed_ones(self) -> None:
-        """Take those of ``/tf`` that do not change: older drivers send all of them there."""
+        """Return the constant transforms of ``/tf``: older drivers send all of them there."""
         found: dict[tuple[str, str], list[FloatArray]] = {}
         for topic in self._topics(_MOVING):
             for parent, child, T in self._read(topic):
@@ -140,14 +140,14 @@ class Transforms:
 
 
 def names_of_coordinates(image: ImageTopic, frame: str) -> tuple[str, ...]:
-    """Return the names by which transforms know a camera, the surest first.
+    """Return the names of a camera's frame in transforms, the most certain first.
 
     Parameters
     ----------
     image
         Images of the camera.
     frame
-        Frame that stands in the heads of its messages.
+        Frame id in the headers of its messages.
     """
     stream = stream_of(image)
     names = [] if stream is None else [stream]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Layouts of further data sets, each recognised by its files, and those of other packages."""
+"""Layouts of further data sets, recognised by their files, and those of other packages."""
 
 from orbslam2py.datasets.layouts.bonn import BonnSequence
 from orbslam2py.datasets.layouts.icl_nuim import IclNuimSequence

@@ -36,7 +36,7 @@ class BonnSequence(TumSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence, by its name."""
+        """Return whether a folder is such a sequence, by its name."""
         names = (folder.resolve().name, folder.absolute().name)
         return (folder / "rgb.txt").is_file() and any(name.startswith(_NAME) for name in names)
 

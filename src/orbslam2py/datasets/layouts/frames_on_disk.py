@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What sequences of colour and depth images with a pose per image have in common."""
+"""Common parts of sequences of colour and depth images with a pose for each image."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _UNKNOWN = ("nan", "inf", "1.#ind", "1.#qnan", "1.#inf")
 
 
 class DepthSequence(RecordedSequence):
-    """Colour images with registered depth, listed by a class of its own for each layout.
+    """Colour images with registered depth; each layout has a class that lists them.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class DepthSequence(RecordedSequence):
     def _camera(
         self, numbers: dict[str, float], depth_factor: float, source: Path | None = None
     ) -> Settings:
-        """Make settings of a camera's numbers and the units of its depth per metre."""
+        """Make settings of the parameters of a camera and the units of its depth per metre."""
         try:
             camera = CameraSettings(**numbers, rgb=True)  # type: ignore[arg-type]
             factor = depth_factor if self.sensor is Sensor.RGBD else None
@@ -93,7 +93,7 @@ class DepthSequence(RecordedSequence):
 
 
 def counted_stamps(numbers: list[int], fps: float) -> Stamps:
-    """Make times of images that are counted, at a constant rate."""
+    """Make times of numbered images, at a constant rate."""
     texts = tuple(f"{number / fps:.9f}" for number in numbers)
     return Stamps(np.array([float(text) for text in texts]), texts, ())
 
@@ -106,12 +106,12 @@ def read_matrices(path: Path, per_line: int) -> FloatArray:
     path
         The file.
     per_line
-        Numbers in every line: 16 (a pose a line) or 4 (a row a line).
+        Numbers in every line: 16 (one pose) or 4 (one row).
 
     Returns
     -------
     FloatArray
-        (n, 4, 4); a pose that is none has NaN in it.
+        (n, 4, 4); an invalid pose contains NaN.
 
     Raises
     ------
@@ -145,12 +145,12 @@ def read_matrices(path: Path, per_line: int) -> FloatArray:
 
 
 def known_poses(path: Path, seconds: FloatArray, T_wc: FloatArray) -> Trajectory | None:
-    """Make a trajectory of the poses that are known; None if none is.
+    """Make a trajectory of the known poses; None if there are none.
 
     Raises
     ------
     DatasetError
-        If there are not as many poses as times.
+        If the numbers of poses and times differ.
     """
     if len(T_wc) < len(seconds):
         raise DatasetError(

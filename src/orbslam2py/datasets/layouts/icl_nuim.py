@@ -24,7 +24,7 @@ _DEPTH_PER_METRE = 5000.0
 class IclNuimSequence(DepthSequence):
     """A rendered sequence of ICL-NUIM; see `datasets.base.Sequence`.
 
-    Images are counted, 30 a second, and so are the poses of ``*.gt.freiburg``.
+    Images and the poses of ``*.gt.freiburg`` are numbered, 30 a second.
     """
 
     layout = Layout.ICL_NUIM

@@ -37,27 +37,27 @@ _PAGE = "https://www.cvlibs.net/datasets/kitti/raw_data.php"
 class KittiRawSequence(RecordedSequence):
     """A drive of KITTI raw, such as ``2011_09_26_drive_0001_sync``; see `datasets.base.Sequence`.
 
-    The grey cameras ``image_00`` and ``image_01`` are taken if they are there, else the colour
-    cameras ``image_02`` and ``image_03``. Time stamps are the dates of ``timestamps.txt``, as
-    seconds since 1970 (the clock of the car). ``calib_cam_to_cam.txt`` lies one folder up. The raw
-    images of a drive that ends in ``_extract`` are rectified for stereo; a single camera is used
-    as it is, with its distortion.
+    The grey cameras ``image_00`` and ``image_01`` are used if they exist, else the colour cameras
+    ``image_02`` and ``image_03``. Time stamps are the dates of ``timestamps.txt``, as seconds since
+    1970 (the clock of the car). ``calib_cam_to_cam.txt`` is in the parent folder. The raw images of
+    a drive that ends in ``_extract`` are rectified for stereo; images of a single camera stay
+    unchanged, with distortion.
 
     Parameters
     ----------
     folder
         The drive.
     sensor
-        Monocular (left camera) or stereo; by default stereo if both cameras of a pair are there.
+        Monocular (left camera) or stereo; by default stereo if there are images of both cameras.
     settings
         Settings, a file, a built-in name, or None for the calibration of the drive.
 
     Raises
     ------
     DatasetError
-        Naming the file, and the line if a list is malformed.
+        The message names the file, and the line if a list is malformed.
     SettingsError
-        If the settings are wrong.
+        If the settings are invalid.
     """
 
     layout = Layout.KITTI_RAW
@@ -127,9 +127,9 @@ class KittiRawSequence(RecordedSequence):
     def ground_truth(self) -> Trajectory | None:
         """Read the poses of ``oxts`` and move them to the left camera.
 
-        See `datasets.base.Sequence.ground_truth`. The world begins at the first position: x east,
-        y north, z up, in metres. None as well if a calibration is missing that tells where the
-        camera is: ``calib_imu_to_velo.txt`` and ``calib_velo_to_cam.txt``.
+        See `datasets.base.Sequence.ground_truth`. The world begins at the first position: x east, y
+        north, z up, in metres. None also if a calibration of the camera's pose is missing:
+        ``calib_imu_to_velo.txt`` and ``calib_velo_to_cam.txt``.
         """
         if not (self.folder / "oxts" / "data").is_dir():
             return None
@@ -162,7 +162,7 @@ class KittiRawSequence(RecordedSequence):
         return self.folder / f"image_{camera:02d}"
 
     def _list(self, camera: int) -> tuple[Stamps, list[Path]]:
-        """Times and images of a camera: line n of the list belongs to image n, from 0."""
+        """Times and images of a camera: line n of the list is the time of image n, from 0."""
         folder = self._camera_folder(camera)
         path = folder / "timestamps.txt"
         stamps = _read_dates(path)
@@ -190,7 +190,7 @@ class KittiRawSequence(RecordedSequence):
         return self.folder.resolve().parent
 
     def _find(self, name: str) -> Path | None:
-        """Find a calibration file: it lies in the folder of the day, above the drive."""
+        """Find a calibration file in the folder of the day, above the drive."""
         places = (self.folder / name, self._above / name)
         return next((path for path in places if path.is_file()), None)
 
@@ -210,7 +210,7 @@ class KittiRawSequence(RecordedSequence):
 
     @cached_property
     def _is_raw(self) -> bool:
-        """Whether images are as the camera took them, by their size or else by the name."""
+        """Return whether images are raw, by their size or else by the name."""
         size = None
         for image in read_sample(self._paths[:1]):
             size = (image.shape[1], image.shape[0])

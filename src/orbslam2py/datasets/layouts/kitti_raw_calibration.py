@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calibration of a day of KITTI raw, and the settings that follow from it."""
+"""Calibration of a day of KITTI raw, and its settings."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ _SHAPES = {"S": (2,), "K": (3, 3), "D": (5,), "R": (3, 3), "T": (3,), "P": (3, 4
 
 
 class DriveCalibration:
-    """What the calibration files of a day tell.
+    """The contents of the calibration files of a day.
 
     Parameters
     ----------
     paths
-        The files by their names; None for one that is missing, which is then not read.
+        The files by their names; None for a missing one.
     """
 
     VEHICLE_FILES = (_IMU_FILE, _VELODYNE_FILE)
@@ -46,19 +46,19 @@ class DriveCalibration:
         self._paths = paths
 
     def size(self, camera: int, *, raw: bool) -> tuple[int, int]:
-        """Width and height of a camera's images, as taken or rectified [pixels]."""
+        """Width and height of a camera's images, raw or rectified [pixels]."""
         width, height = self._of_camera("S" if raw else "S_rect", camera)
         return int(width), int(height)
 
     def monocular_settings(self, camera: int, fps: float, *, raw: bool) -> Settings:
-        """Make settings of one camera, as taken (with its distortion) or rectified."""
+        """Make settings of one camera, raw (with its distortion) or rectified."""
         K = self._of_camera("K", camera) if raw else self._of_camera("P_rect", camera)
         k1, k2, p1, p2, k3 = self._of_camera("D", camera).tolist() if raw else [0.0] * 5
         lens = {"k1": k1, "k2": k2, "p1": p1, "p2": p2, "k3": k3}
         return self._settings(Sensor.MONOCULAR, K, self.size(camera, raw=raw), fps, lens)
 
     def stereo_settings(self, pair: tuple[int, int], fps: float, *, raw: bool) -> Settings:
-        """Make settings of a rectified pair, with its rectification if images are as taken."""
+        """Make settings of a rectified pair, with the rectification if images are raw."""
         P_left, P_right = (self._of_camera("P_rect", camera) for camera in pair)
         bf = float(P_left[0, 3] - P_right[0, 3])
         if bf <= 0:
@@ -74,7 +74,7 @@ class DriveCalibration:
         return self._settings(Sensor.STEREO, P_left, size, fps, {"bf": bf}, rectification)
 
     def T_camera_imu(self, camera: int, *, raw: bool) -> FloatArray:
-        """Transform (4, 4) from the IMU to a camera, as it is or rectified [m]."""
+        """Return the transform (4, 4) from the IMU to a camera, raw or rectified [m]."""
         to_velodyne = self._rigid(self._read(_IMU_FILE), _IMU_FILE)
         to_first = self._rigid(self._read(_VELODYNE_FILE), _VELODYNE_FILE)
         T = np.eye(4)
@@ -156,7 +156,7 @@ class DriveCalibration:
         return T
 
     def _read(self, name: str) -> dict[str, FloatArray]:
-        """Numbers by their names; what is no number (``calib_time``) is left out."""
+        """Read numbers by their names; other values (``calib_time``) are left out."""
         path = self._path(name)
         found = {}
         for line in content_lines(path):

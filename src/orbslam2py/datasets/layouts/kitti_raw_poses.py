@@ -26,13 +26,13 @@ def read_oxts(folder: Path, n_times: int) -> tuple[list[int], FloatArray]:
     folder
         ``oxts/data``, with a file per packet: ``0000000000.txt``.
     n_times
-        Number of time stamps there are.
+        Number of time stamps.
 
     Returns
     -------
     numbers, T_w_imu
         Numbers of the packets, and the poses (n, 4, 4) of the IMU (x forward, y left, z up) in a
-        world of metres: x east, y north, z up, from the first position on.
+        world in metres: x east, y north, z up, with the first position as origin.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loaders by layout: those of this package, and those of packages that are installed beside it."""
+"""Loaders by layout: those of this package, and those of other installed packages."""
 
 from __future__ import annotations
 
@@ -28,15 +28,14 @@ ENTRY_POINTS = "orbslam2py.sequences"
 class Loader(Protocol):
     """Opens the sequences of a layout; usually the class of the sequence itself.
 
-    A package names it in its ``pyproject.toml``, and folders of its layout are recognised from
-    then on::
+    A package names it in its ``pyproject.toml``; then folders of its layout are recognised::
 
         [project.entry-points."orbslam2py.sequences"]
         my-robot = "my_package:RobotSequence"
     """
 
     def recognises(self, folder: Path, /) -> bool:
-        """Tell whether a folder is of this layout, by its files; must be quick."""
+        """Return whether a folder has this layout, by its files; must be fast."""
         ...
 
     def __call__(
@@ -70,12 +69,12 @@ OWN: dict[str, Loader] = {
 def find_loaders(folder: Path) -> dict[str, Loader]:
     """Return the loaders that recognise a folder, by the names of their layouts.
 
-    One of another package goes before those of this one.
+    Loaders of other packages take precedence.
 
     Raises
     ------
     DatasetError
-        If the loader of another package cannot be imported, or is none.
+        If the loader of another package cannot be imported, or is invalid.
     """
     if not folder.is_dir():
         return {}
@@ -94,7 +93,7 @@ def loader_of(name: str) -> Loader | None:
 
 @cache
 def _installed(places: tuple[str, ...]) -> tuple[EntryPoint, ...]:
-    """Return the loaders of other packages; `places` is the path on which they are searched."""
+    """Return the loaders of other packages; `places` is the search path."""
     return tuple(entry_points(group=ENTRY_POINTS))
 
 

@@ -31,7 +31,7 @@ class OpenLorisSequence(DepthSequence):
     """The colour camera of a sequence of OpenLORIS-Scene; see `datasets.base.Sequence`.
 
     Depth is ``aligned_depth``, which is registered to colour. The poses of ``groundtruth.txt`` are
-    taken as they are.
+    used unchanged.
     """
 
     layout = Layout.OPENLORIS
@@ -96,7 +96,7 @@ def _read_list(path: Path) -> tuple[Stamps, list[Path]]:
 
 
 def _values_of(path: Path) -> dict[str, list[float]]:
-    """Return the numbers of the colour camera."""
+    """Return the parameters of the colour camera."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:

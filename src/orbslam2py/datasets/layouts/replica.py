@@ -27,8 +27,8 @@ _FPS = 30.0
 class ReplicaSequence(DepthSequence):
     """A rendered sequence of Replica, such as ``office0``; see `datasets.base.Sequence`.
 
-    The camera is that of ``cam_params.json``, which lies beside the sequences. Images are counted,
-    30 a second: the data set has no times.
+    The camera is described in ``cam_params.json``, beside the sequences. Images are numbered, 30 a
+    second: the data set has no times.
     """
 
     layout = Layout.REPLICA

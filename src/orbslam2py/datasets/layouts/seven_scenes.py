@@ -36,8 +36,8 @@ _NONE = 65535
 class SevenScenesSequence(DepthSequence):
     """A sequence of 7-Scenes, such as ``chess/seq-01``; see `datasets.base.Sequence`.
 
-    ``frame-000000.depth.proj.png``, depth that was registered to the colour camera, goes before
-    ``frame-000000.depth.png``, which is that of the depth camera.
+    ``frame-000000.depth.proj.png``, which is registered to the colour camera, is preferred to
+    ``frame-000000.depth.png`` of the depth camera.
     """
 
     layout = Layout.SEVEN_SCENES

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps cut, moved, and laid into other worlds."""
+"""Cropping, transforming and combining maps."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A part of a map: some keyframes, what they see, and a tree that spans them."""
+"""A part of a map: some keyframes, their observations, and a spanning tree."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _DYING_COUNT = 2
 
 
 def crop_to_times(contents: MapContents, begin: float, end: float) -> MapContents:
-    """Keep the keyframes of a span of time, and what they see (`keep_keyframes`).
+    """Keep the keyframes of a time interval, and their observations (`keep_keyframes`).
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ def crop_to_times(contents: MapContents, begin: float, end: float) -> MapContent
     Raises
     ------
     MapFileError
-        If no keyframe is left, or one of them is something else.
+        If no keyframe is left, or an argument is invalid.
     """
     return keep_keyframes(contents, keyframes_of_times(contents, begin, end))
 
 
 def keyframes_of_times(contents: MapContents, begin: float, end: float) -> BoolArray:
-    """Which keyframes, bool (k,), are of a span of time; see `crop_to_times`."""
+    """Return which keyframes, bool (k,), are in a time interval; see `crop_to_times`."""
     times = contents_of(contents).keyframes.timestamps
     begin, end = _seconds(begin, "begin"), _seconds(end, "end")
     kept = (times >= begin) & (times <= end)
@@ -62,22 +62,22 @@ def keyframes_of_times(contents: MapContents, begin: float, end: float) -> BoolA
 def crop_to_box(
     contents: MapContents, low: FloatArray, high: FloatArray, *, points_too: bool = False
 ) -> MapContents:
-    """Keep the keyframes whose cameras stood in a box, and what they see (`keep_keyframes`).
+    """Keep the keyframes whose cameras are in a box, and their observations (`keep_keyframes`).
 
     Parameters
     ----------
     contents
         The map.
     low, high
-        Corners (3,) of the box in the map's world, both included. Of several maps, in the world of
-        each.
+        Corners (3,) of the box in the map's world, both included. With several maps, in the world
+        of each.
     points_too
-        Drop points that lie outside of the box as well.
+        Also drop points outside the box.
 
     Raises
     ------
     MapFileError
-        If no keyframe is left, or one of them is something else.
+        If no keyframe is left, or an argument is invalid.
     """
     kept = keyframes_in_box(contents, low, high)
     points = inside_box(contents.points.positions, low, high) if points_too else None
@@ -85,7 +85,7 @@ def crop_to_box(
 
 
 def keyframes_in_box(contents: MapContents, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Which keyframes, bool (k,), stood in a box; see `crop_to_box`."""
+    """Return which keyframes, bool (k,), are in a box; see `crop_to_box`."""
     centres = contents_of(contents).keyframes.T_wc[:, :3, 3]
     kept = inside_box(centres, low, high)
     if not kept.any():
@@ -98,7 +98,7 @@ def keyframes_in_box(contents: MapContents, low: FloatArray, high: FloatArray) -
 
 
 def inside_box(positions: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
-    """Which positions (n, 3) lie in a box, its faces included; bool (n,)."""
+    """Return which positions (n, 3) are in a box or on its faces; bool (n,)."""
     low = array_of(low, "the low corner", (3,), MapFileError, finite=False)
     high = array_of(high, "the high corner", (3,), MapFileError, finite=False)
     return np.asarray(np.all((positions >= low) & (positions <= high), axis=1))
@@ -107,24 +107,24 @@ def inside_box(positions: FloatArray, low: FloatArray, high: FloatArray) -> Bool
 def keep_keyframes(
     contents: MapContents, kept: BoolArray, kept_points: BoolArray | None = None
 ) -> MapContents:
-    """Keep some keyframes of a map, and what they see.
+    """Keep some keyframes of a map, and their observations.
 
-    Points live by the map's own rule: one that has lost an observation needs more than one
-    observation with depth, or more than two without. Connections are counted anew; keyframes whose
-    parent went hang on their strongest neighbour. If keyframe 0 went, the first one that is left
-    takes its number, since it becomes the root. The world stays.
+    Points follow the rule of the map: a point that has lost an observation is kept if it has more
+    than one observation with depth, or more than two without. Connections are counted again. A
+    keyframe without parent gets its strongest neighbour as parent. If keyframe 0 is removed, the
+    first remaining keyframe gets its number, because it becomes the root. The world stays.
 
-    Of several maps each stays a map of its own: if its root went, the first of its keyframes that
-    is left becomes the root.
+    Several maps stay separate: if the root of one is removed, its first remaining keyframe becomes
+    the root.
 
     Parameters
     ----------
     contents
         The map.
     kept
-        Which keyframes, bool (k,), at least one.
+        Mask of the keyframes, bool (k,), at least one of them true.
     kept_points
-        Which points may stay, bool (p,); all of them by default.
+        Mask of the points that may be kept, bool (p,); all of them by default.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def keep_keyframes(
     Raises
     ------
     MapFileError
-        If no keyframe is kept, or one of them is something else.
+        If no keyframe is kept, or an argument is invalid.
     """
     contents_of(contents)
     kept = _mask(kept, "kept", len(contents.keyframes), "keyframe")
@@ -176,7 +176,7 @@ def keep_keyframes(
 
 
 def _mask(value: Any, what: str, n: int, noun: str) -> BoolArray:
-    """Take True or False for each of `n`: whole numbers would be taken for indices."""
+    """Take a mask of `n` values; refuse whole numbers, which would count as indices."""
     remedy = f"give a bool array of shape ({n},), True for each {noun} that stays"
     try:
         mask = np.asarray(value)
@@ -196,7 +196,7 @@ def _seconds(value: Any, what: str) -> float:
 def _surviving_observations(
     contents: MapContents, kept: BoolArray, kept_points: BoolArray
 ) -> BoolArray:
-    """Which observations (o,) stay: of kept keyframes and of points that do not die of the loss."""
+    """Return which observations (o,) stay: of kept keyframes and of points that remain."""
     observations, keyframes = contents.observations, contents.keyframes
     there = kept[np.searchsorted(keyframes.ids, observations.keyframe)]
     row = np.searchsorted(contents.points.ids, observations.point)
@@ -229,7 +229,7 @@ _OF_KEYPOINTS = {
 
 
 def _still_hanging(removed: RemovedKeyframes, living: IntArray) -> RemovedKeyframes:
-    """Those that were removed before and hang, however indirectly, on a keyframe that is kept."""
+    """Return the removed keyframes that refer, directly or not, to a kept keyframe."""
     reached = np.isin(removed.parent, living)
     while True:
         more = reached | np.isin(removed.parent, removed.ids[reached])
@@ -240,7 +240,7 @@ def _still_hanging(removed: RemovedKeyframes, living: IntArray) -> RemovedKeyfra
 
 
 def _select_points(contents: MapContents, kept: BoolArray) -> MapContents:
-    """Drop points; a point whose reference keyframe went refers to its first observer."""
+    """Drop points; replace removed reference keyframes by the first observing ones."""
     observations = contents.observations
     points = replace(
         contents.points, **{name: array[kept] for name, array in contents.points.arrays()}
@@ -253,7 +253,7 @@ def _select_points(contents: MapContents, kept: BoolArray) -> MapContents:
 
 
 def refresh_distances(contents: MapContents, which: BoolArray) -> MapContents:
-    """Work the range of distances of some points out anew, from their reference keyframes.
+    """Compute the range of distances of some points again, from their reference keyframes.
 
     Raul Mur-Artal et al., "ORB-SLAM", 2015, section III-C; ``docs/method/map.md#map-points``.
 
@@ -282,7 +282,7 @@ def refresh_distances(contents: MapContents, which: BoolArray) -> MapContents:
 
 
 def _renumbered(contents: MapContents, root: int) -> MapContents:
-    """Give the keyframe with the lowest id the number 0, which the root has."""
+    """Give the keyframe with the lowest id the number 0 of the root."""
 
     def new(ids: IntArray) -> IntArray:
         return np.where(ids == root, 0, ids)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several maps in one file: one taken out, changed and put back, maps of files put together.
+"""Several maps in one file: take one out, put it back, combine files.
 
 Each keyframe without a parent is the root of a map; ``docs/method/several_maps.md``.
 """
@@ -36,24 +36,24 @@ __all__ = ["crop_among_others", "map_numbers", "put_back", "put_together", "take
 
 
 def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
-    """Take one map of a file that may hold several.
+    """Take one map from a file that may contain several.
 
     Parameters
     ----------
     saved
         What the file holds.
     number
-        Which, from 0 for the oldest one; may be left out if there is only one.
+        Its number, from 0 for the oldest; not needed if there is only one.
 
     Returns
     -------
     SavedMap
-        `saved` itself if it holds no other.
+        `saved` itself if it contains no other.
 
     Raises
     ------
     MapFileError
-        If there is no such map, or none is named and there are several.
+        If there is no such map, or no number is given and there are several.
     """
     numbers = map_numbers(saved.contents.keyframes)
     counts = np.bincount(numbers)
@@ -71,7 +71,7 @@ def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
 def crop_among_others(
     saved: SavedMap, number: int, kept: BoolArray, kept_points: BoolArray | None = None
 ) -> tuple[SavedMap, int]:
-    """Keep some keyframes of one map of a file, and the other maps as they are.
+    """Keep some keyframes of one map of a file, and all of the other maps.
 
     Parameters
     ----------
@@ -80,16 +80,16 @@ def crop_among_others(
     number
         Which map.
     kept
-        Which of its keyframes, bool (k,), at least one.
+        Mask of its keyframes, bool (k,), at least one of them true.
     kept_points
-        Which of its points may stay, bool (p,); all of them by default.
+        Mask of its points that may be kept, bool (p,); all of them by default.
 
     Returns
     -------
     cropped
         All maps.
     number
-        That of the map then: maps are numbered by their first keyframes.
+        The new number of this map: maps are numbered by their first keyframes.
     """
     contents = saved.contents
     numbers = map_numbers(contents.keyframes)
@@ -118,22 +118,22 @@ def crop_among_others(
 
 
 def _edges_among(edges: Covisibility, keyframe_ids: IntArray) -> Covisibility:
-    """Those between some keyframes of one map, with the weights of their last count."""
+    """Return the edges between keyframes of one map, with their weights of the last count."""
     chosen = np.isin(edges.a, keyframe_ids)
     return Covisibility(edges.a[chosen], edges.b[chosen], edges.weight[chosen])
 
 
 def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:
-    """Put a map that was moved or refined back among the others of its file, which stay.
+    """Put a map that was moved or refined back into its file, beside the other maps.
 
     Parameters
     ----------
     saved
         What the file holds.
     number
-        Which map was taken from it (`take_map`).
+        Number of the map in the file (`take_map`).
     edited
-        The map, with the same keyframes and points in other places.
+        The map, with the same keyframes and points at other positions.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:
 
 
 def _baselines(contents: MapContents) -> FloatArray:
-    """`Cameras.bf` of each keyframe (k,): cameras themselves may be counted in another way."""
+    """`Cameras.bf` of each keyframe (k,): the numbers of the cameras may differ."""
     return np.asarray(contents.cameras.bf[contents.keyframes.camera])
 
 
@@ -191,10 +191,10 @@ def _placed(group: _Group, rows: IntArray, edited: _Group, names: tuple[str, ...
 
 
 def put_together(files: Sequence[SavedMap]) -> SavedMap:
-    """Put the maps of several files into one, each in a world of its own as before.
+    """Combine the maps of several files in one; each keeps its own world.
 
-    Numbers of keyframes and points follow each other in the order of the files; settings and visual
-    words are those of the first.
+    Keyframes and points are numbered in the order of the files; settings and visual words are those
+    of the first.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
     def together(
         kind: type[Any], group: Callable[[MapContents], ArrayGroup], **shifts: NDArray[np.int64]
     ) -> Any:
-        """Arrays of one group one after the other; ids are shifted."""
+        """Join the arrays of one group; ids are shifted."""
         columns: dict[str, list[NDArray[Any]]] = {}
         for number, part in enumerate(parts):
             for name, array in group(part).arrays():
@@ -273,7 +273,7 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
 
 
 def _complete(keyframes: Keyframes, all_of_them: Sequence[Keyframes]) -> Keyframes:
-    """With what may be left out where no keyframe has it, if others have it."""
+    """Add optional arrays that no keyframe of this map has, if another map has them."""
     n = int(keyframes.offsets[-1])
     raw, colours, words = keyframes.raw_keypoints, keyframes.colours, keyframes.words
     if not len(raw) and any(len(other.raw_keypoints) for other in all_of_them):

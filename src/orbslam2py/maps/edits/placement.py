@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a map is in a world that is known otherwise: by a true path, by points, by a length."""
+"""Alignment of a map with another world: by a true trajectory, by points, or by a length."""
 
 from __future__ import annotations
 
@@ -30,19 +30,18 @@ FARTHEST = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """How a map comes into another world; ``transform_map(..., metric=True)`` takes it there.
+    """The transform of a map into another world; ``transform_map(..., metric=True)`` applies it.
 
     Attributes
     ----------
     similarity
-        From the map's world to the other; its scale is 1 for a map that sees metres.
+        From the map's world to the other; its scale is 1 for a map in metres.
     n_pairs
         Number of positions that determined it.
     rmse
-        Of the distances that are left between them [m]; 0 where a length alone determined it.
+        RMS of the remaining distances [m]; 0 if a length alone determined it.
     on_a_line
-        The positions of a path lie on a line: the turn around it is not known, and was chosen
-        small.
+        The positions are on a line: the rotation about it is not known, and the smallest is used.
     """
 
     similarity: Similarity
@@ -54,22 +53,22 @@ class Placement:
 def place_by_trajectory(
     contents: MapContents, truth: Trajectory, *, max_difference: float = MAX_DIFFERENCE
 ) -> Placement:
-    """Lay the keyframes on the true poses of the same times (Umeyama, PAMI 1991).
+    """Align the keyframes with the true poses of the same times (Umeyama, PAMI 1991).
 
     Parameters
     ----------
     contents
-        The map; its unit is fitted as well if it is that of a single camera.
+        The map; for a single camera its scale is estimated too.
     truth
         Poses of the camera; only positions count.
     max_difference
-        Of time stamps that belong together [s].
+        Largest difference of matching time stamps [s].
 
     Raises
     ------
     MapFileError
-        If fewer than three keyframes have a true pose at their time, all stood at one place, a
-        position is farther away than anything is, or one of them is something else.
+        If fewer than three keyframes have a true pose at their time, if all are at one position, if
+        a position is impossibly far away, or if an argument is invalid.
     """
     keyframes = contents_of(contents).keyframes
     instance_of(truth, Trajectory, "the truth", "an orbslam2py.Trajectory", MapFileError)
@@ -86,22 +85,22 @@ def place_by_trajectory(
 
 
 def place_by_points(contents: MapContents, positions: FloatArray, known: FloatArray) -> Placement:
-    """Lay positions in the map on where they are known to be (Umeyama, PAMI 1991).
+    """Align positions in the map with known positions (Umeyama, PAMI 1991).
 
     Parameters
     ----------
     contents
-        The map; its unit is fitted as well if it is that of a single camera.
+        The map; for a single camera its scale is estimated too.
     positions
-        In the map's world, (m, 3), at least three.
+        Positions in the map's world, (m, 3), at least three.
     known
-        The same places in the other world, (m, 3).
+        The same points in the other world, (m, 3).
 
     Raises
     ------
     MapFileError
-        If there are fewer than three, all are at one place or on one line, one is farther away
-        than anything is, or they are no such arrays.
+        If there are fewer than three, if all are at one position or on a line, if one is impossibly
+        far away, or if they are no such arrays.
     """
     contents_of(contents)
     positions = array_of(positions, "positions", (-1, 3), MapFileError, finite=False)
@@ -126,7 +125,7 @@ def place_by_points(contents: MapContents, positions: FloatArray, known: FloatAr
 
 
 def _place(contents: MapContents, positions: FloatArray, known: FloatArray) -> Placement:
-    """Lay positions on where they are known to be; a turn that they do not tell is kept small."""
+    """Align positions with known ones; an undetermined rotation is kept small."""
     _check_near(positions)
     _check_near(known)
     spreads = [_spread(places) for places in (positions, known)]
@@ -147,7 +146,7 @@ def _place(contents: MapContents, positions: FloatArray, known: FloatArray) -> P
 def place_by_length(
     contents: MapContents, first: FloatArray, second: FloatArray, metres: float
 ) -> Placement:
-    """Give the map of a single camera metres: two places in it are so far apart.
+    """Set the unit of a single camera's map by the distance between two positions.
 
     Parameters
     ----------
@@ -161,8 +160,8 @@ def place_by_length(
     Raises
     ------
     MapFileError
-        If the map has metres already, the places are one, or the length or a place is none that
-        can be meant.
+        If the map is already in metres, if both positions are the same, or if the length or a
+        position is impossible.
     """
     if sees_metres(contents_of(contents)):
         raise MapFileError(
@@ -190,7 +189,7 @@ def place_by_length(
 
 
 def _check_near(positions: FloatArray) -> None:
-    """Refuse positions (m, 3) that are farther away than anything is."""
+    """Refuse positions (m, 3) that are impossibly far away."""
     far = np.flatnonzero(~(np.abs(positions) <= FARTHEST).all(axis=1))
     if len(far):
         named = ", ".join(f"{number:g}" for number in positions[far[0]])

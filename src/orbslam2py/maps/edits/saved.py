@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A part of a saved map, with the frames of its runs and its images."""
+"""A part of a saved map, with the frames and images that belong to it."""
 
 from __future__ import annotations
 
@@ -15,27 +15,26 @@ from orbslam2py.maps.saved_map import RecordedFrames, SavedMap, saved_of
 def crop_saved_map(
     saved: SavedMap, kept: BoolArray, kept_points: BoolArray | None = None
 ) -> SavedMap:
-    """Keep some keyframes of a saved map, and all that hangs on them.
+    """Keep some keyframes of a saved map, and all that belongs to them.
 
     Parameters
     ----------
     saved
         The map.
     kept
-        Which keyframes, bool (k,), at least one.
+        Mask of the keyframes, bool (k,), at least one of them true.
     kept_points
-        Which points may stay, bool (p,); all of them by default.
+        Mask of the points that may be kept, bool (p,); all of them by default.
 
     Returns
     -------
     SavedMap
-        With the map that `keep_keyframes` gives; frames of its runs that hang on keyframes that
-        went are left out, and so are these keyframes' images.
+        The map of `keep_keyframes`, without the frames and images of removed keyframes.
 
     Raises
     ------
     MapFileError
-        If no keyframe is kept, or one of them is something else.
+        If no keyframe is kept, or an argument is invalid.
     """
     saved_of(saved)
     contents = keep_keyframes(saved.contents, kept, kept_points)
@@ -51,7 +50,7 @@ def crop_saved_map(
 
 
 def _hanging_on(frames: RecordedFrames, ids: IntArray, new_ids: IntArray) -> RecordedFrames:
-    """Frames whose keyframe is one of these, which have new numbers."""
+    """Return the frames of these keyframes, with the new ids."""
     order = np.argsort(ids)
     place = np.minimum(np.searchsorted(ids[order], frames.keyframes), len(ids) - 1)
     stay = ids[order][place] == frames.keyframes

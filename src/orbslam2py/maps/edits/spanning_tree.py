@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What connects the keyframes of a map, also when it has lost some: shared points, and a tree."""
+"""The graph of a map, also after keyframes were removed: shared points and spanning tree."""
 
 from __future__ import annotations
 
@@ -63,26 +63,27 @@ def map_numbers(keyframes: Keyframes) -> IntArray:
 def spanning_parents(
     keyframes: Keyframes, covisibility: Covisibility, maps: IntArray
 ) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Make a spanning tree of what is left of one, for each map.
+    """Make a spanning tree of the remaining keyframes of each map.
 
-    A keyframe keeps its parent if that is there. Otherwise it hangs on its strongest neighbour that
-    is not in its own subtree (of equals, the lower id), and without one provisionally on the
-    keyframe of its map before it (``docs/method/map.md#spanning-tree``).
+    A keyframe keeps its parent if that remains. Otherwise its parent is its strongest neighbour
+    outside its own subtree (of equals, the lower id). Without one, it is provisionally the previous
+    keyframe of the map (``docs/method/map.md#spanning-tree``).
 
     Parameters
     ----------
     keyframes
-        Those that are there, by ascending id; the first of each map becomes its root, if it is not.
-        Parents may be missing.
+        The remaining keyframes by ascending id; the first of each map becomes its root, if it is
+        not. Parents may be missing.
     covisibility
         Of these keyframes.
     maps
-        Numbers (k,) of the maps that they belong to: nothing leads from one to another.
+        Numbers (k,) of their maps; different maps have no common tree.
 
     Returns
     -------
     parents, provisional
-        Ids int64 (k,), -1 for the roots; and bool (k,).
+        Ids of the parents, int64 (k,), -1 for the roots; and whether they are provisional, bool
+        (k,).
     """
     ids = keyframes.ids
     parents = _parent_rows(keyframes)
@@ -102,7 +103,7 @@ def spanning_parents(
 
 
 def _parent_rows(keyframes: Keyframes) -> IntArray:
-    """Row of the parent of each keyframe (k,), -1 if it has none that is there."""
+    """Row of the parent of each keyframe (k,), -1 if it has none among them."""
     ids, parents = keyframes.ids, keyframes.parent
     place = np.minimum(np.searchsorted(ids, parents), len(ids) - 1)
     return np.where((parents >= 0) & (ids[place] == parents), place, _NONE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A map moved into another world: turned, shifted, and scaled."""
+"""A map moved into another world: rotated, translated, and scaled."""
 
 from __future__ import annotations
 
@@ -18,32 +18,31 @@ from orbslam2py.trajectory.rotations import inverse_poses
 def transform_map(
     contents: MapContents, similarity: Similarity, *, metric: bool = False
 ) -> MapContents:
-    """Move a map as a whole; everything in it that has a length or a direction follows.
+    """Transform a whole map, with all its lengths and directions.
 
-    With a scale other than 1, so do depths, the distances from which points are searched, the
-    baselines of cameras, and what frames that hang on keyframes are scaled by (`Keyframes.scale`).
-    Pixels stay what they are.
+    A scale other than 1 also changes depths, scale ranges of points, baselines of cameras, and the
+    scale of frames relative to keyframes (`Keyframes.scale`). Pixels do not change.
 
     Parameters
     ----------
     contents
         The map.
     similarity
-        From the map's world to the new one. A map that sees metres (stereo, RGB-D) fits its camera
-        only with a scale of 1.
+        From the map's world to the new one. A map in metres (stereo, RGB-D) remains consistent with
+        its camera only with a scale of 1.
     metric
-        Lengths in the new world are metres: the map of a single camera, which cannot see them,
-        remembers that (`MapContents.metric_roots`). Without it another scale is another unit.
+        Lengths in the new world are metres; the map of a single camera stores this
+        (`MapContents.metric_roots`). Otherwise another scale is another unit.
 
     Returns
     -------
     MapContents
-        The same map in the new world; `similarity`'s inverse leads back but for rounding.
+        The same map in the new world; the inverse of `similarity` restores it up to rounding.
 
     Raises
     ------
     MapFileError
-        If one of them is something else.
+        If an argument is invalid.
     """
     contents_of(contents)
     instance_of(similarity, Similarity, "the similarity", "a Similarity(scale, R, t)", MapFileError)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps for other programs: COLMAP, nerfstudio, pose graphs, clouds of points, trajectories."""
+"""Maps for other programs: COLMAP, nerfstudio, pose graphs, point clouds, trajectories."""

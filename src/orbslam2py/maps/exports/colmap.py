@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps as models of COLMAP, which Gaussian splatting and structure from motion read."""
+"""Maps as COLMAP models, for Gaussian splatting and structure from motion."""
 
 from __future__ import annotations
 
@@ -37,18 +37,19 @@ def export_colmap(
     progress: Progress | None = None,
     field: float | None = None,
 ) -> None:
-    """Write a map as a model of COLMAP: ``sparse/0`` and, if they are given, ``images``.
+    """Write a map as a COLMAP model: ``sparse/0`` and, if they are given, ``images``.
 
-    Poses are world to camera with quaternions w, x, y, z; the centre of the top-left pixel is
-    (0.5, 0.5), half a pixel more than here ("Output format" in COLMAP's documentation). Ids are
-    those of keyframes and points, plus 1. Every keypoint is in its image, so their numbers stay.
+    Poses are world to camera with quaternions w, x, y, z. The centre of the top-left pixel is (0.5,
+    0.5), half a pixel more than in this package ("Output format" in COLMAP's documentation). Ids
+    are those of keyframes and points, plus 1. Images contain all keypoints of their keyframe, so
+    the numbers of keypoints do not change.
 
     Parameters
     ----------
     contents
-        The map; the unit of length stays (one camera: the map's own).
+        The map; the unit of length does not change (one camera: the map's own).
     folder
-        Where to: new, empty, or with `replace` an earlier export.
+        The folder: new, empty, or with `replace` an earlier export.
     images
         Where the keyframes' images come from (`images_of`): they are written without the lens'
         distortion, for cameras of the model ``PINHOLE``; keyframes without one are left out.
@@ -57,11 +58,11 @@ def export_colmap(
         ``OPENCV_FISHEYE`` (Kannala-Brandt) or ``FOV`` in either case; the `images` of other models
         become those of a pinhole.
     image_names
-        Names for images that are elsewhere, by keyframe id, where `images` is not given; keyframes
-        without one are left out. By default ``keyframe_000012.png`` and so on. Names with spaces
-        take ``.bin`` files: COLMAP reads those in text files up to the first space.
+        Names of existing images by keyframe id, if `images` is not given; keyframes without a name
+        are left out. By default ``keyframe_000012.png`` and so on. Names with spaces need ``.bin``
+        files, because COLMAP reads names in text files up to the first space.
     binary
-        ``.bin`` files, or the text files.
+        Write ``.bin`` files, otherwise text files.
     replace
         Replace an earlier export.
     progress
@@ -75,14 +76,13 @@ def export_colmap(
     Raises
     ------
     DatasetError
-        If the folder holds something that must stay, or no keyframe has an image.
+        If the folder contains other files, or no keyframe has an image.
     ImageError
-        If an image is not one that fits its camera.
+        If an image does not fit its camera.
     MapFileError
-        If `contents`, `images` or `image_names` are something else, or a name is none that COLMAP
-        would read.
+        If `contents`, `images` or `image_names` are invalid, or COLMAP could not read a name.
     OSError
-        If something cannot be written; what was there is kept then.
+        If a file cannot be written; earlier files are kept then.
 
     Examples
     --------
@@ -214,7 +214,7 @@ def _image_bytes(image: ColmapImage) -> bytes:
 
 
 def _points_bytes(points: ColmapPoints) -> bytes:
-    """Every point's head is followed by its track, so heads stand at uneven distances."""
+    """The track of a point follows its head, so the distances between heads vary."""
     length = np.diff(points.offsets)
     heads = np.empty(len(points), _POINT_HEAD)
     heads["id"], heads["xyz"], heads["rgb"] = points.ids, points.positions, points.colours

@@ -57,9 +57,9 @@ class ColmapImage:
     camera_id: int
     name: str
     pixels: FloatArray
-    """(n, 2) all keypoints, in the order of the keyframe's."""
+    """(n, 2) all keypoints, in the order of the keyframe."""
     point_ids: IntArray
-    """(n,) -1 where the keypoint shows no point."""
+    """(n,) -1 for a keypoint without a point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +75,11 @@ class ColmapPoints:
     errors: FloatArray
     """(p,) mean reprojection error [px of the images]."""
     offsets: IntArray
-    """(p + 1,) into the tracks."""
+    """(p + 1,) offsets into the tracks."""
     track_images: IntArray
     """(o,) ids of images."""
     track_keypoints: IntArray
-    """(o,) numbers of keypoints there, from 0."""
+    """(o,) numbers of the keypoints in the images, from 0."""
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -87,7 +87,7 @@ class ColmapPoints:
 
 @dataclass(frozen=True, eq=False)
 class ColmapModel:
-    """Cameras, images and points that belong together."""
+    """Cameras, images and points of one model."""
 
     cameras: tuple[ColmapCamera, ...]
     images: tuple[ColmapImage, ...]

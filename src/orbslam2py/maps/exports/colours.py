@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Colours for the keypoints of a map that was made without them, from the keyframes' images."""
+"""Colours for keypoints of a map without colours, from the images of its keyframes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from orbslam2py.maps.exports.images import ImageOfKeyframe, image_of_row
 
 
 class ColourSampler:
-    """Collects colours keyframe by keyframe; those that a map has already stay.
+    """Adds colours keyframe by keyframe; existing colours do not change.
 
     Parameters
     ----------
@@ -39,7 +39,8 @@ class ColourSampler:
         row
             Of the keyframe.
         image
-            As its camera saw it, uint8 (h, w) grey or (h, w, 3) RGB; another size is a scaled one.
+            The distorted image, uint8 (h, w) grey or (h, w, 3) RGB; an image of another size counts
+            as scaled.
         """
         if self._known[row]:
             return
@@ -56,7 +57,7 @@ class ColourSampler:
         self._known[row] = True
 
     def coloured(self) -> MapContents:
-        """Return the map with all colours that are known."""
+        """Return the map with all known colours."""
         if not self._known.any():
             return self._contents
         keyframes = replace(
@@ -66,26 +67,26 @@ class ColourSampler:
 
 
 def with_colours(contents: MapContents, images: ImageOfKeyframe) -> MapContents:
-    """Colour the keypoints of keyframes that have no colours, from their images.
+    """Add colours from images to keypoints of keyframes without colours.
 
     Parameters
     ----------
     contents
         The map.
     images
-        Where the keyframes' images come from; see `images_of`.
+        The source of the keyframes' images; see `images_of`.
 
     Returns
     -------
     MapContents
-        The same map; `MapContents.point_colours` then knows the points' colours.
+        The same map with colours, as `MapContents.point_colours` uses them.
 
     Raises
     ------
     ImageError
-        If an image is not one that fits its camera.
+        If an image does not fit its camera.
     MapFileError
-        If `contents` or `images` is something else.
+        If `contents` or `images` is invalid.
     """
     contents_of(contents)
     sampler = ColourSampler(contents)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The folder of an export, and the images in it, without the lens' distortion."""
+"""The folder of an export, and its images without distortion."""
 
 from __future__ import annotations
 
@@ -36,21 +36,21 @@ _log = logging.getLogger(__name__)
 
 @contextlib.contextmanager
 def export_folder(folder: str | Path, made_of: set[str], *, replace: bool) -> Iterator[Path]:
-    """Make the folder of an export; it appears only when everything was written.
+    """Make the folder of an export; it appears only after all files are written.
 
     Parameters
     ----------
     folder
-        Where to: new, empty, or with `replace` an earlier export.
+        The folder: new, empty, or with `replace` an earlier export.
     made_of
-        What an export of this kind has in its folder; a folder with anything else is not replaced.
+        Files and folders of this kind of export; a folder with anything else is not replaced.
     replace
         Replace an earlier export.
 
     Raises
     ------
     DatasetError
-        If there is something that must stay.
+        If the folder contains other files.
     OSError
         If it cannot be written.
     """
@@ -81,7 +81,7 @@ def write_images(
     held: Collection[str] = (),
     field: float | None = None,
 ) -> tuple[list[View], MapContents]:
-    """Write the keyframes' images as PNG files, as a pinhole camera would see them.
+    """Write the keyframes' images as PNG files of a pinhole camera.
 
     Those of fisheye cameras that the format can hold stay as they are; of others a pinhole view is
     cut out. Of pinhole cameras the camera keeps its matrix; what a lens bends out of the image is
@@ -93,9 +93,9 @@ def write_images(
     contents
         The map.
     folder
-        Where to; made if it does not exist.
+        The folder; it is created if needed.
     images
-        Where they come from; keyframes without one are left out.
+        The source of the images; keyframes without an image are left out.
     progress
         Called after every keyframe.
     held
@@ -109,16 +109,16 @@ def write_images(
     views : list of View
         One per image.
     contents : MapContents
-        With colours from the images where there were none.
+        The map, with colours from the images where there were none.
 
     Raises
     ------
     DatasetError
         If no keyframe has an image.
     ImageError
-        If an image is not one that fits its camera.
+        If an image does not fit its camera.
     OSError
-        If one cannot be written.
+        If a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     pinholes = _PinholesOfFisheyes(contents, held, field)

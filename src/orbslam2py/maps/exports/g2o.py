@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map's graph of keyframes as a pose graph that g2o, GTSAM and Ceres' examples read."""
+"""The keyframes of a map as a pose graph for g2o, GTSAM and the examples of Ceres."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ _DRIFT = (
 def export_g2o(
     contents: MapContents, path: str | Path, *, least_weight: int = ESSENTIAL_WEIGHT
 ) -> None:
-    """Write keyframes and what links them as a pose graph: ``VERTEX_SE3:QUAT``, ``EDGE_SE3:QUAT``.
+    """Write keyframes and edges as a pose graph: ``VERTEX_SE3:QUAT``, ``EDGE_SE3:QUAT``.
 
     Vertices hold the pose camera to world, an edge from i to j the pose of camera j in camera i, as
     x, y, z, then the quaternion x, y, z, w; its information matrix (6, 6), upper triangle, is the
     identity (R. Kümmerle et al., "g2o: A general framework for graph optimization", ICRA 2011; the
     types ``SE3:QUAT`` of its library slam3d). Edges are those of the spanning tree, of strong
-    covisibility, and of closed loops, each once; as the map is, all of them are without error.
-    Keyframe 0 is fixed.
+    covisibility, and of closed loops, each once; they have the relative poses of the map and
+    therefore no error. Keyframe 0 is fixed.
 
     Parameters
     ----------
     contents
-        The map; the unit of length stays (one camera: the map's own, which a comment says).
+        The map; the unit of length does not change (one camera: the map's own, as a comment says).
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     least_weight
-        Least number of shared points of two keyframes that are linked.
+        Least number of shared points of an edge of covisibility.
 
     Raises
     ------
     MapFileError
-        If `contents` or `path` is something else.
+        If `contents` or `path` is invalid.
     OSError
         If it cannot be written; an existing file is kept then.
     """
@@ -79,7 +79,7 @@ def export_g2o(
 
 
 def pose_graph_edges(contents: MapContents, least_weight: int) -> IntArray:
-    """Pairs of ids (e, 2), ascending, the lower one first: tree, strong covisibility, loops."""
+    """Return pairs of ids (e, 2), the lower id first: tree, strong covisibility, loops."""
     keyframes, covisibility = contents.keyframes, contents.covisibility
     child = keyframes.parent >= 0
     strong = covisibility.weight >= least_weight
@@ -94,6 +94,6 @@ def pose_graph_edges(contents: MapContents, least_weight: int) -> IntArray:
 
 
 def _numbers(T: FloatArray) -> list[str]:
-    """Position and quaternion of poses (n, 4, 4), all digits."""
+    """Return positions and quaternions of poses (n, 4, 4), with all digits."""
     rows = np.column_stack([T[:, :3, 3], quaternions_from_rotations(T[:, :3, :3])])
     return [" ".join(map(repr, row)) for row in rows.tolist()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of keyframes: where they come from, and how an export shows them."""
+"""Images of keyframes: their sources, and their use in exports."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class _HasImage(Protocol):
 
 
 class ImageSequence(Protocol):
-    """What `images_of` takes: a sequence as from `orbslam2py.open_sequence`, or alike.
+    """Argument of `images_of`: a sequence from `orbslam2py.open_sequence`, or a similar object.
 
     Attributes
     ----------
     settings
-        Tell the order of the colours (``camera.rgb``).
+        The settings, which give the order of the colours (``camera.rgb``).
     timestamps
         Seconds, float64 (n,).
     """
@@ -50,31 +50,31 @@ class ImageSequence(Protocol):
     def timestamps(self) -> FloatArray: ...  # noqa: D102
 
     def load(self, index: int, /) -> _HasImage:
-        """Read (and rectify) a frame; its ``image`` is that of the only, left or colour camera."""
+        """Read (and rectify) a frame; its ``image`` is of the single or left camera."""
         ...
 
 
 def images_of(contents: MapContents, sequence: ImageSequence) -> ImageOfKeyframe:
-    """Find the keyframes' images in the sequence that the map was made of, by their time stamps.
+    """Find the images of the keyframes in their sequence by the time stamps.
 
     Parameters
     ----------
     contents
         The map.
     sequence
-        Opened for the same sensor, so that images of a pair are rectified as they were then.
+        The sequence, opened for the same sensor, so that images of a pair are rectified as before.
 
     Returns
     -------
     callable
-        ``image(keyframe_id)``: uint8 (h, w) or (h, w, 3) RGB; None for a keyframe of another time.
+        ``image(keyframe_id)``: uint8 (h, w) or (h, w, 3) RGB; None for a keyframe without an image.
 
     Raises
     ------
     DatasetError
         If no keyframe's time stamp is in the sequence.
     MapFileError
-        If `contents` is something else.
+        If `contents` is invalid.
     """
     keyframes = contents_of(contents).keyframes
     rows, indices = associate(keyframes.timestamps, sequence.timestamps, _SAME_TIME)
@@ -100,7 +100,7 @@ def images_of(contents: MapContents, sequence: ImageSequence) -> ImageOfKeyframe
 
 
 def image_of_row(contents: MapContents, row: int, images: ImageOfKeyframe) -> ByteArray | None:
-    """Ask for the image of a keyframe; small copies will do.
+    """Return the image of a keyframe; small copies are allowed.
 
     Parameters
     ----------
@@ -109,14 +109,14 @@ def image_of_row(contents: MapContents, row: int, images: ImageOfKeyframe) -> By
     row
         Of the keyframe.
     images
-        Where the image comes from.
+        The source of the images.
 
     Raises
     ------
     ImageError
-        If it is no image of bytes, or not of the shape of its camera's.
+        If it is no uint8 image, or does not have the shape of the camera's.
     MapFileError
-        If `images` is no function.
+        If `images` is not callable.
     """
     if not callable(images):
         raise MapFileError(
@@ -141,7 +141,7 @@ def image_of_row(contents: MapContents, row: int, images: ImageOfKeyframe) -> By
 
 
 def _check_aspect(contents: MapContents, row: int, image: ByteArray, name: str) -> None:
-    """Refuse an image that is no scaled one of the camera, but for rounding of its size."""
+    """Refuse an image that is no scaled image of the camera, within rounding of its size."""
     cameras, camera = contents.cameras, int(contents.keyframes.camera[row])
     full_width, full_height = int(cameras.width[camera]), int(cameras.height[camera])
     height, width = image.shape[:2]
@@ -160,12 +160,12 @@ def _span(timestamps: FloatArray) -> str:
 
 @dataclass(frozen=True)
 class View:
-    """A keyframe as an export shows it."""
+    """A keyframe in an export."""
 
     row: int
-    """Of the keyframe in `Keyframes`."""
+    """Row of the keyframe in `Keyframes`."""
     name: str
-    """File of its image, below the folder of images."""
+    """File name of its image, in the folder of images."""
     width: int
     """Of that image [px]."""
     height: int
@@ -187,12 +187,12 @@ def fisheye_of(
     format_name
         For the message.
     others
-        Names in the format of models beside Kannala-Brandt, by our names.
+        Names of models other than Kannala-Brandt in the format, by our names.
 
     Raises
     ------
     DatasetError
-        If the format cannot hold the model.
+        If the format does not have the model.
     """
     names = {"kannala_brandt": "OPENCV_FISHEYE", **others}
     if model.name not in names:
@@ -207,19 +207,19 @@ def fisheye_of(
 def views_without_images(
     contents: MapContents, names: Mapping[int, str | Path] | None
 ) -> list[View]:
-    """Views of all keyframes on images that are elsewhere, as the camera took them.
+    """Views of all keyframes for existing, distorted images.
 
     Parameters
     ----------
     contents
         The map.
     names
-        Files by keyframe id; by default ``keyframe_000012.png`` and so on.
+        File names by keyframe id; by default ``keyframe_000012.png`` and so on.
 
     Raises
     ------
     MapFileError
-        If `names` is no mapping, or what it has for a keyframe can be no file's name.
+        If `names` is no mapping, or a name cannot be that of a file.
     """
     if names is not None:
         remedy = "a dict from keyframe ids to names of files"
@@ -242,7 +242,7 @@ def views_without_images(
 
 
 def _name_given(value: Any, keyframe_id: int) -> str:
-    """Take the name of the file of a keyframe's image, as formats of lines of text can have it."""
+    """Check the file name of a keyframe's image, for formats with lines of text."""
     what = f"image_names[{keyframe_id}]"
     path = path_of(value, what, MapFileError)
     name = value if isinstance(value, str) else path.as_posix()
@@ -257,12 +257,12 @@ def _name_given(value: Any, keyframe_id: int) -> str:
 
 
 def image_name(keyframe_id: int) -> str:
-    """Name of the file of a keyframe's image."""
+    """Return the file name of a keyframe's image."""
     return f"keyframe_{keyframe_id:06d}.png"
 
 
 def pixel_scale(contents: MapContents, view: View) -> tuple[float, float]:
-    """Pixels of a view's image per pixel of the camera, in x and y."""
+    """Pixels of the exported image per pixel of the camera, in x and y."""
     camera = int(contents.keyframes.camera[view.row])
     cameras = contents.cameras
     return view.width / int(cameras.width[camera]), view.height / int(cameras.height[camera])

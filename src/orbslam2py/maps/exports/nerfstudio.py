@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps as data for nerfstudio, which trains radiance fields and splats."""
+"""Maps as data for nerfstudio, for radiance fields and Gaussian splatting."""
 
 from __future__ import annotations
 
@@ -50,23 +50,23 @@ def export_nerfstudio(
     """Write a map as ``transforms.json`` with its points in ``sparse_pc.ply``, and ``images``.
 
     ``transform_matrix`` maps the camera in OpenGL's axes (x right, y up, looking along -z) to a
-    world whose z points up; ``applied_transform`` is what turned the map's world into that one. The
-    centre of the top-left pixel is (0.5, 0.5), half a pixel more than here (M. Tancik et al.,
+    world with z up; ``applied_transform`` is the transform from the map's world to it. The centre
+    of the top-left pixel is (0.5, 0.5), half a pixel more than in this package (M. Tancik et al.,
     "Nerfstudio", SIGGRAPH 2023; "Data conventions" in its documentation).
 
     Parameters
     ----------
     contents
-        The map; the unit of length stays (one camera: the map's own).
+        The map; the unit of length does not change (one camera: the map's own).
     folder
-        Where to: new, empty, or with `replace` an earlier export.
+        The folder: new, empty, or with `replace` an earlier export.
     images
-        Where the keyframes' images come from (`images_of`): they are written without the lens'
-        distortion; keyframes without one are left out. Without `images` none are written, and the
-        cameras are those that took them, with the lens' coefficients.
+        The source of the keyframes' images (`images_of`). They are written without distortion;
+        keyframes without an image are left out. Without `images` no images are written, and the
+        cameras have their distortion.
     image_names
-        Paths, absolute or below the folder, of images that are elsewhere, by keyframe id, where
-        `images` is not given; keyframes without one are left out.
+        Paths of existing images, absolute or relative to the folder, by keyframe id, if `images` is
+        not given; keyframes without a path are left out.
     replace
         Replace an earlier export.
     progress
@@ -80,14 +80,14 @@ def export_nerfstudio(
     Raises
     ------
     DatasetError
-        If the folder holds something that must stay, no keyframe has an image, or images that are
-        not written were taken through a rational lens, which nerfstudio does not know.
+        If the folder contains other files, no keyframe has an image, or distorted images have the
+        rational model, which nerfstudio does not support.
     ImageError
-        If an image is not one that fits its camera.
+        If an image does not fit its camera.
     MapFileError
-        If `contents`, `images` or `image_names` are something else, or the map has no keyframes.
+        If `contents`, `images` or `image_names` are invalid, or the map has no keyframes.
     OSError
-        If something cannot be written; what was there is kept then.
+        If a file cannot be written; earlier files are kept then.
     """
     if not len(contents_of(contents).keyframes):
         raise MapFileError("the map has no keyframes, and nerfstudio takes no empty data; map more")
@@ -136,7 +136,7 @@ def _transforms(contents: MapContents, views: list[View], below: str) -> dict[st
 
 
 def camera_to_world(T_wc: FloatArray) -> FloatArray:
-    """Turn poses (k, 4, 4) of OpenCV's cameras into nerfstudio's, in the world whose z is up."""
+    """Convert poses (k, 4, 4) from OpenCV's axes to nerfstudio's, in the world with z up."""
     return np.asarray(_UP @ T_wc @ _OPENGL)
 
 

@@ -45,23 +45,23 @@ def write_pcd(
     Parameters
     ----------
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     points
         Positions (p, 3) in the frame of keyframe 0's camera; written as float32.
     colours
         Red, green and blue of every point, uint8 (p, 3); no such field if None.
     unit
-        Of the positions, for the comment in the file.
+        Unit of the positions, for the comment in the file.
     frame
-        What the axes are, for the comment in the file.
+        Description of the axes, for the comment in the file.
 
     Raises
     ------
     OSError
         If the file cannot be written; an existing file is kept then.
     DatasetError
-        If the points or the colours are no such array, there is not one colour per point, or the
-        path is none.
+        If the arrays are invalid, if the numbers of colours and points differ, or if the path is
+        invalid.
     """
     path = path_of(path, "the file of points")
     names = ["x", "y", "z"]

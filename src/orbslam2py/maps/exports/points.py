@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map's points as a cloud, PLY or PCD."""
+"""The map points as a point cloud, PLY or PCD."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from orbslam2py.maps.units import unit_of
 
 
 def export_points(contents: MapContents, path: str | Path, file_format: str | None = None) -> None:
-    """Write the points in the map's world, coloured where the map has colours (`with_colours`).
+    """Write the points in the map's world, with colours if the map has them (`with_colours`).
 
     Parameters
     ----------
     contents
         The map.
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     file_format
-        ``ply`` or ``pcd``; by default what the name ends with.
+        ``ply`` or ``pcd``; by default the suffix of the name.
 
     Raises
     ------
     MapFileError
-        If the format is another, or not told, or one of them is something else.
+        If the format is unknown or missing, or an argument is invalid.
     OSError
         If it cannot be written; an existing file is kept then.
     """

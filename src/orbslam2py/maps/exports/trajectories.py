@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The keyframes' way through the map's world as a trajectory file."""
+"""The trajectory of the keyframes in the map's world as a file."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ def export_trajectory(
     ----------
     trajectory
         Poses camera to world, such as `keyframe_path` gives. They are written in the order of their
-        time stamps, which those of merged maps are not in; of equal ones, which a warning tells, in
-        their own. Lost ones are left out; KITTI's format has no time stamps, so there one line
-        belongs to each pose that is left.
+        time stamps, which merged maps do not have; poses of equal time keep their order, with a
+        warning. Lost poses are left out. KITTI's format has no time stamps; it gets one line for
+        each remaining pose.
     path
-        The file; replaced only when everything was written.
+        The file; replaced only after everything is written.
     file_format
         One of `TrajectoryFormat`, or its name.
 
     Raises
     ------
     DatasetError
-        For ``auto``, what is no format, and what is no trajectory or no path.
+        For ``auto``, an unknown format, or an invalid trajectory or path.
     OSError
         If it cannot be written; an existing file is kept then.
     """

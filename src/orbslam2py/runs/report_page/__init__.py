@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One run, or several side by side, as a page that works without a network: report.html.
+"""One or several runs as a page that needs no network: report.html.
 
-Drawn from the files in the folders of the runs; it knows no figure that is not in them.
+All figures come from the files in the folders of the runs.
 """
 
 from __future__ import annotations
@@ -36,13 +36,12 @@ def write_report_page(path: Path, folders: Path | Sequence[Path]) -> None:
     path : Path
         The file.
     folders : Path or sequence of Path
-        The folder of the run; of several, each of the run's files is taken from the first that
-        has it.
+        The folder of the run; of several, each file is read from the first that has it.
 
     Raises
     ------
     DatasetError
-        If the folder holds no run, or no whole one.
+        If the folder contains no run, or an incomplete one.
     OSError
         If the file cannot be written.
     """
@@ -52,7 +51,7 @@ def write_report_page(path: Path, folders: Path | Sequence[Path]) -> None:
 
 
 def compare_runs(folders: Sequence[Path]) -> Comparison:
-    """Read several runs and put them side by side.
+    """Read several runs for a comparison.
 
     Parameters
     ----------
@@ -62,12 +61,12 @@ def compare_runs(folders: Sequence[Path]) -> Comparison:
     Returns
     -------
     Comparison
-        Figures, paths in one frame, and what is to be said about comparing these runs.
+        Figures, trajectories in one frame, and remarks on the comparison.
 
     Raises
     ------
     DatasetError
-        If there are fewer than two, or one is no run, or not whole.
+        If there are fewer than two, or one is no run or an incomplete one.
     """
     return Comparison.of([read_run(folder) for folder in folders])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths from above, in equal lengths on both axes."""
+"""Trajectories from above, with equal scales of both axes."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _CORNERS, _POINTS = 2500, 3000
 
 @dataclass(frozen=True)
 class Window:
-    """The part of the plane that is drawn: centre and half size, in lengths."""
+    """The visible part of the plane: centre and half size, in lengths."""
 
     low: FloatArray
     high: FloatArray
 
     @classmethod
     def around(cls, flat: FloatArray, points: FloatArray) -> Window:
-        """Show the path and what is around it, but not what would shrink it to a dot."""
+        """Show the trajectory and its surroundings, without points that are too far away."""
         flat = flat if len(flat) else points if len(points) else np.zeros((1, 2))
         low, high = flat.min(axis=0), flat.max(axis=0)
         extent = float((high - low).max())
@@ -59,7 +59,7 @@ class Window:
         return float(_WIDTH * size[1] / size[0])
 
     def place(self, flat: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Lengths to places in the drawing."""
+        """Convert lengths to positions in the drawing."""
         per_length = _WIDTH / (self.high[0] - self.low[0])
         return per_length * (flat[:, 0] - self.low[0]), per_length * (self.high[1] - flat[:, 1])
 
@@ -69,7 +69,7 @@ class Window:
 
 
 def thin_path(flat: FloatArray, gaps: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Coordinates of a line broken before each of `gaps`, with fewer corners."""
+    """Return coordinates of a line with interruptions before `gaps`, with fewer corners."""
     keep = np.arange(0, len(flat), max(1, len(flat) // _CORNERS))
     keep = np.unique(np.concatenate([keep, gaps, gaps - 1, [len(flat) - 1]]).astype(int))
     keep = keep[keep >= 0] if len(flat) else keep[:0]
@@ -85,7 +85,7 @@ def path_mark(window: Window, flat: FloatArray, gaps: IntArray, look: str) -> Ma
 
 
 def coloured_path(window: Window, flat: FloatArray, gaps: IntArray, values: FloatArray) -> Markup:
-    """Draw a path in the colours of its values: classes 0 to `N_COLOURS` - 1, -1 unknown."""
+    """Draw a trajectory in the colours of its values: classes 0 to `N_COLOURS` - 1, -1 unknown."""
     px, py = window.place(flat)
     step = max(1, len(flat) // _CORNERS)
     broken = np.zeros(len(flat) + 1, bool)
@@ -104,12 +104,12 @@ def coloured_path(window: Window, flat: FloatArray, gaps: IntArray, values: Floa
 
 
 def colours_of(errors: FloatArray) -> tuple[FloatArray, float]:
-    """Put errors into classes of equal width.
+    """Classify errors in intervals of equal width.
 
     Returns
     -------
     classes, largest
-        (n,) from 0 to `N_COLOURS` - 1, -1 where the error is not known; and the largest error.
+        Classes (n,) from 0 to `N_COLOURS` - 1, -1 if the error is unknown; and the largest error.
     """
     known = np.isfinite(errors)
     largest = float(errors[known].max()) if known.any() else 0.0
@@ -143,7 +143,7 @@ def plane(
     name: str = "above",
     above: Markup | None = None,
 ) -> Markup:
-    """Put marks into a drawing with axes and a bar that tells a length."""
+    """Put marks into a drawing with axes and a scale bar."""
     size = window.high - window.low
     xs = round_ticks(float(window.low[0]), float(window.high[0]), 6)
     ys = round_ticks(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The columns of a table of text, each value checked: what is wrong is named with its line."""
+"""The columns of a table of text, with checked values: errors name the line."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from orbslam2py.errors import DatasetError
 
 
 class Columns:
-    """Columns by their names, all of one length.
+    """Columns by their names, all of equal length.
 
     Parameters
     ----------
     path
         The file, for messages.
     lines
-        In which line each value stands.
+        Line number of each value.
     columns
         Texts by the name of the column.
     """
@@ -50,16 +50,16 @@ class Columns:
         return self._columns[name]
 
     def get(self, name: str, otherwise: list[str]) -> list[str]:
-        """Texts of a column that there may be."""
+        """Texts of an optional column."""
         return self._columns.get(name, otherwise)
 
     def words(self, name: str, noun: str, known: Collection[str]) -> list[str]:
-        """Texts of a column that holds some words only.
+        """Texts of a column with a fixed set of words.
 
         Raises
         ------
         DatasetError
-            Naming the line of another one.
+            The message names the line of another word.
         """
         for line, text in zip(self._lines, self[name], strict=True):
             if text not in known:
@@ -67,12 +67,12 @@ class Columns:
         return self[name]
 
     def numbers(self, name: str, *, may_be_empty: bool = True) -> FloatArray:
-        """Finite numbers of a column, nan where it is empty.
+        """Finite numbers of a column, nan if empty.
 
         Raises
         ------
         DatasetError
-            Naming the line of what is none.
+            The message names the line of the invalid value.
         """
         found = np.full(len(self), np.nan)
         for row, text in enumerate(self[name]):
@@ -86,7 +86,7 @@ class Columns:
         Raises
         ------
         DatasetError
-            Naming the line of what is none.
+            The message names the line of the invalid value.
         """
         numbers = self.numbers(name, may_be_empty=False)
         broken = np.flatnonzero(numbers != np.rint(numbers))

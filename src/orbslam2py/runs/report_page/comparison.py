@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several runs side by side: one frame for their paths, one table for their figures."""
+"""Comparison of several runs: one frame for their trajectories, one table for their figures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Row:
     figure: Figure
     values: list[str]
     best: list[bool]
-    """Which runs have the best value; none if all have the same, or there is no better."""
+    """Which runs have the best value; none if all are equal, or the figure has no best value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +37,14 @@ class Comparison:
 
     stories: list[Story]
     names: list[str]
-    """Of the runs, all different."""
+    """Names of the runs, all different."""
     paths: list[FloatArray | None]
-    """Positions (n, 3) of each run in the frame and unit of the first; None if it is not known."""
+    """Positions (n, 3) of each run in the frame and unit of the first; None if unknown."""
     warnings: list[str]
 
     @classmethod
     def of(cls, runs: Sequence[RunFolder]) -> Comparison:
-        """Put runs side by side.
+        """Compare runs.
 
         Raises
         ------
@@ -84,7 +84,7 @@ class Comparison:
         return [story.run for story in self.stories]
 
     def rows(self) -> dict[str, list[Row]]:
-        """All figures that any run has, group by group."""
+        """Return all figures that at least one run has, group by group."""
         return {
             group: [
                 self._row(figure)
@@ -113,7 +113,7 @@ class Comparison:
 
 
 def _names(runs: Sequence[RunFolder]) -> list[str]:
-    """Names of the folders, with as much of the path before as makes them differ."""
+    """Return names of the folders, with enough of their paths to be different."""
     parts = [run.folder.resolve().parts for run in runs]
     for n in range(1, max(len(part) for part in parts) + 1):
         names = ["/".join(part[-n:]) for part in parts]
@@ -123,7 +123,7 @@ def _names(runs: Sequence[RunFolder]) -> list[str]:
 
 
 def _in_frame_of(first: RunFolder, run: RunFolder) -> FloatArray | None:
-    """Move the path of a run onto that of the first, by the poses at the same times."""
+    """Align the trajectory of a run with that of the first, by the poses at equal times."""
     positions = first.metres * first.path.positions
     if run is first:
         return positions if len(positions) else None

@@ -50,7 +50,7 @@ def comparison_page(comparison: Comparison) -> str:
 
 
 def look(number: int) -> str:
-    """Class of the colour of a run."""
+    """Return the colour class of a run."""
     return f"run{number % _N_COLOURS}{' dashed' if number >= _N_COLOURS else ''}"
 
 
@@ -223,7 +223,7 @@ def _data(comparison: Comparison) -> dict[str, object]:
 
 
 def _run_data(story: Story, name: str, look_of_run: str) -> dict[str, object]:
-    """What the cursor tells of a run, frame by frame."""
+    """Return the values of a run at the cursor, frame by frame."""
     frames = story.run.frames
     keep = np.arange(0, len(frames), max(1, -(-len(frames) // _FRAMES)))
     tracked = np.where(frames.state == "OK", frames.inliers, np.nan)

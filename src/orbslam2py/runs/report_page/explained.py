@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the figures of report.json are, in words: those of docs/reference/files.md."""
+"""Descriptions of the figures of report.json: those of docs/reference/files.md."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class Figure:
     text: str
     """What it is."""
     best: int = 0
-    """1: the larger the better, -1: the smaller the better, 0: neither."""
+    """1: larger is better, -1: smaller is better, 0: neither."""
 
     def value(self, report: dict[str, Any]) -> str:
-        """Write its value for reading; a dash if there is none."""
+        """Return its value as text; a dash if there is none."""
         value = report.get(self.key)
         if value is None:
             return NONE
@@ -38,7 +38,7 @@ class Figure:
 
 
 def compared_over(report: dict[str, Any]) -> str:
-    """Say which part of the run the errors are of, such as ``over 2 of 10 frames``."""
+    """Return which part of the run the errors cover, such as ``over 2 of 10 frames``."""
     poses, frames = report.get("matched_poses"), report.get("frames")
     if poses is None or frames is None:
         return ""
@@ -47,13 +47,13 @@ def compared_over(report: dict[str, Any]) -> str:
 
 
 def is_of_last_map_only(report: dict[str, Any]) -> bool:
-    """Whether frames of other maps have poses, which the errors know nothing of."""
+    """Return whether frames of other maps have poses, which the errors do not cover."""
     poses = report.get("matched_of_poses")
     return poses is not None and poses < report.get("tracked", 0)
 
 
 def loaded_map_words(report: dict[str, Any]) -> str:
-    """Say which map a run began in."""
+    """Return a text: the initial map of a run."""
     entry = report["loaded_map"]
     held = (("keyframes", "keyframe"), ("map_points", "map point"), ("runs", "run"))
     parts = [number_of(entry[key], noun) for key, noun in held if key in entry]
@@ -61,7 +61,7 @@ def loaded_map_words(report: dict[str, Any]) -> str:
 
 
 def depth_words(report: dict[str, Any]) -> str:
-    """Say how far the first depth images are, and with which factor."""
+    """Return a text: the depth of the first depth images, and the factor."""
     entry = report["depth"]
     if entry is None:
         return NONE
@@ -69,7 +69,7 @@ def depth_words(report: dict[str, Any]) -> str:
 
 
 def relocalisations_words(report: dict[str, Any]) -> str:
-    """Say how often a lost camera was found, and that a loaded map begins with such a finding."""
+    """Return a text: number of relocalizations; a loaded map begins with one."""
     count = int(report.get("relocalisations", 0))
     if not count or report.get("loaded_map") is None:
         return str(count)

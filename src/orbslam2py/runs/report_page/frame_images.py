@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of some frames with the map points in them: frame_images.zip."""
+"""Images of some frames with their map points: frame_images.zip."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _FILL, _RIM = (66, 228, 240), (60, 40, 0)
 
 
 def has_images(source: Source) -> TypeGuard[Sequence]:
-    """Whether images can be read again: those of a camera are gone."""
+    """Return whether images can be read again, unlike those of a camera."""
     return is_sequence(cast("Sequence | LiveSource", source))
 
 
 def has_any_images(result: RunResult) -> bool:
-    """Whether images of a run can be shown: read again, or kept while it ran."""
+    """Return whether images of a run can be shown: read again, or kept during the run."""
     return has_images(result.sequence) or bool(_kept(result))
 
 
@@ -48,20 +48,20 @@ def _kept(result: RunResult) -> list[int]:
 
 
 def choose_frames(result: RunResult, extra: IntArray | None = None) -> list[int]:
-    """Choose the frames whose images tell most.
+    """Choose the most informative frames.
 
     Parameters
     ----------
     result : RunResult
         A run that has ended.
     extra : array of int64, optional
-        Positions of frames in `RunResult.rows` that are to be among them.
+        Positions of further frames in `RunResult.rows`.
 
     Returns
     -------
     list of int
         Positions in `RunResult.rows`, ascending: some keyframes of the main map, those of its
-        loops, the first images of losses, and the extra ones.
+        loops, the first images of losses, and the further ones.
     """
     keyframes = result.keyframes.indices
     if result.kept_images is not None:
@@ -82,8 +82,8 @@ def choose_frames(result: RunResult, extra: IntArray | None = None) -> list[int]
 def write_frame_images(path: Path, result: RunResult, positions: list[int]) -> None:
     """Write images of frames as JPEG into one ZIP file, named by their numbers in the sequence.
 
-    Points of the map that a keyframe observes are marked where they should be seen from its pose.
-    A frame whose image cannot be read again is left out.
+    Map points that a keyframe observes are marked at their predicted pixels. A frame whose image
+    cannot be read again is left out.
 
     Raises
     ------
@@ -110,11 +110,11 @@ def draw_frame(small: SmallImage, points: FloatArray, settings: Settings) -> byt
     Parameters
     ----------
     small
-        The image; its picture is changed.
+        The image; it is changed.
     points
-        In the camera's frame, float64 (p, 3), lengths in any unit.
+        Positions in the camera's frame, float64 (p, 3), in any unit of length.
     settings
-        Of the camera: its lens.
+        Settings of the camera, for its lens.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def draw_frame(small: SmallImage, points: FloatArray, settings: Settings) -> byt
 
 
 def _find(result: RunResult, position: int) -> SmallImage | None:
-    """The image of a frame, read again or kept."""
+    """Return the image of a frame, read again or kept."""
     if result.kept_images is not None:
         return result.kept_images.find(position)
     source, index = result.sequence, result.rows[position].index
@@ -150,7 +150,7 @@ def _find(result: RunResult, position: int) -> SmallImage | None:
 
 
 def _points_seen(result: RunResult, position: int) -> FloatArray:
-    """Points that the keyframe made of a frame observes, in its camera's frame, (p, 3)."""
+    """Return the points that the keyframe of a frame observes, in its camera's frame, (p, 3)."""
     snapshot = result.snapshot
     found = np.flatnonzero(result.keyframes.indices == position)
     if not len(found) or len(result.keyframes) != len(snapshot.keyframe_ids):

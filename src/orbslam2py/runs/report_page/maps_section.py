@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several maps of one run: when each was tracked in, what became of it, its path."""
+"""Several maps of one run: their periods of tracking, their ends, their trajectories."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _NOTE = (
 
 
 def maps_section(story: Story) -> Markup | None:
-    """What is known of each map; None if there was only one."""
+    """Return the table of all maps; None if there was only one."""
     run = story.run
     main = main_number(run)
     paths = {number: path for number, path in run.others.items() if len(path)}
@@ -56,13 +56,13 @@ def maps_section(story: Story) -> Markup | None:
 
 
 def main_number(run: RunFolder) -> int:
-    """Number of the main map; folders of earlier versions hold the last one only."""
+    """Return the number of the main map; folders of earlier versions contain only the last one."""
     numbers = run.frames.map_index[np.isfinite(run.frames.map_index)]
     return int(run.report.get("main_map", numbers[-1] if len(numbers) else 0))
 
 
 def look_of(number: int) -> str:
-    """Class of the colour of a map."""
+    """Return the colour class of a map."""
     return f"map{number % len(PAPER_MAPS)}"
 
 
@@ -78,7 +78,7 @@ def _state(entry: dict[str, Any], main: int) -> str:
 
 
 def _strip(story: Story, entries: dict[int, dict[str, Any]]) -> Markup | None:
-    """When poses were in which map, as it was called then."""
+    """Return the periods with poses in each map, by its number at that time."""
     frames = story.run.frames
     seconds = frames.seconds
     numbers = np.where(frames.has_pose, np.nan_to_num(frames.map_index, nan=-1.0), -1.0).astype(int)

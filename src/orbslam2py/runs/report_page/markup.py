@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""HTML as text that cannot be mixed up with other text: what is not markup is escaped."""
+"""Safe HTML: all text that is not markup is escaped."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def element(name: str, *content: str | None, **attributes: str | float | bool | 
     name
         Of the element.
     content
-        What is in it, one after the other: `Markup` as it is, other text escaped, None left out.
+        Its contents in order: `Markup` unchanged, other text escaped, None left out.
     attributes
-        ``class_`` and the like lose the last ``_``, others become ``-``. None and False leave an
-        attribute out, True gives it no value.
+        ``class_`` and the like lose the last ``_``; other ``_`` become ``-``. None and False omit
+        an attribute, True gives it no value.
 
     Returns
     -------
@@ -47,13 +47,13 @@ def element(name: str, *content: str | None, **attributes: str | float | bool | 
 
 
 def join(*content: str | None) -> Markup:
-    """Put markup and text one after the other; text is escaped, None left out."""
+    """Join markup and text; text is escaped, None left out."""
     parts = (part for part in content if part is not None)
     return Markup("".join(p if isinstance(p, Markup) else escape(p) for p in parts))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, class_: str = "") -> Markup:
-    """Make a table that scrolls by itself where it is too wide."""
+    """Make a table with its own scroll bar if it is too wide."""
     cells = [element("th", text, scope="col") for text in head]
     lines = [element("tr", *(element("td", cell) for cell in row)) for row in rows]
     body = join(element("thead", element("tr", *cells)) if head else None, element("tbody", *lines))

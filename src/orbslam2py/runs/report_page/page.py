@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One page that holds all it needs: text, drawings, style, script, images."""
+"""A self-contained page: text, drawings, style, script, images."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _HEAD = 4096
 
 
 class PageKind(str, Enum):
-    """What a page is of."""
+    """The kind of a page."""
 
     RUN = "run"
     COMPARISON = "comparison"
@@ -77,7 +77,7 @@ def run_page(run: RunFolder) -> str:
 
 
 def kind_of_page(path: Path) -> PageKind | None:
-    """Tell what a page is of that was made here, by whatever version; None for other files."""
+    """Return the kind of a page of this package, of any version; None for other files."""
     try:
         with path.open("rb") as stream:
             head = stream.read(_HEAD).decode(errors="replace")
@@ -100,10 +100,10 @@ def whole_page(
     *,
     kind: PageKind = PageKind.BENCHMARK,
 ) -> str:
-    """Put head, style, script and data around the parts of a page.
+    """Put header, style, script and data around the parts of a page.
 
-    Nothing in the page may load anything or run a script, but for the one script that belongs to
-    it: the page's own policy says so to the browser.
+    The content security policy of the page forbids all loading, and all scripts except the page's
+    own.
     """
     style, script = (
         (_FOLDER / name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
@@ -138,7 +138,7 @@ def whole_page(
 
 
 def repeat_section(report: dict[str, Any]) -> Markup:
-    """What repeats the run: command, options, machine, settings."""
+    """Return all that is needed to repeat the run: command, options, machine, settings."""
     command = report.get("command")
     if command:
         told = join(
@@ -177,7 +177,7 @@ def repeat_section(report: dict[str, Any]) -> Markup:
 
 
 def _date(text: str) -> str:
-    """An ISO date as people write it: minutes are enough."""
+    """Return an ISO date for readers, to the minute."""
     day, _, time = text.partition("T")
     return f"{day} {time[:5]}" if time else day
 
@@ -191,7 +191,7 @@ def _said(value: object) -> str:
 
 
 def _error(report: dict[str, Any]) -> Markup | None:
-    """What ended the run: all below is only of what was done until then."""
+    """Return why the run ended early: the page covers only the part before."""
     told = report.get("error")
     if told is None:
         return None
@@ -209,7 +209,7 @@ def _seen(report: dict[str, Any]) -> str:
 
 
 def _warnings(report: dict[str, Any]) -> Markup | None:
-    """What impairs the result, as the command has printed it."""
+    """Return the warnings about the result, as the command printed them."""
     told = report.get("warnings")
     if not told:
         return None
@@ -224,7 +224,7 @@ def _warnings(report: dict[str, Any]) -> Markup | None:
 
 
 def _notes(report: dict[str, Any]) -> Markup | None:
-    """What one should know before one reads on."""
+    """Return notes for the top of the page."""
     said = []
     warnings = report.get("warnings") or []
     if not report.get("tracked"):

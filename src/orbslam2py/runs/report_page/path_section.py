@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The path of a run, in three dimensions and from above."""
+"""The trajectory of a run, in three dimensions and from above."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from orbslam2py.runs.timeline import gaps_in_time
 
 
 def path_section(story: Story) -> Markup:
-    """The path in three dimensions and from above."""
+    """Return the trajectory in three dimensions and from above."""
     if not len(story.run.path):
         return section("path", "Path", element("p", "No frame of the main map has a pose."))
     layers = ("points", "keyframes", "truth", "loops")
@@ -53,7 +53,7 @@ def path_section(story: Story) -> Markup:
 
 
 def from_above(story: Story) -> Markup:
-    """The path from above: truth, error in colours, keyframes, loops, the worst places."""
+    """Return the trajectory from above, with ground truth, coloured errors, and loops."""
     run = story.run
     positions = run.metres * run.path.positions
     view = choose_view(positions)
@@ -103,7 +103,7 @@ def from_above(story: Story) -> Markup:
 
 
 def colour_bar(largest: float, unit: str) -> Markup:
-    """Tell which colour is which error."""
+    """Return the legend of the colours of errors."""
     boxes = [element("i", class_=f"e{k}") for k in range(above.N_COLOURS)]
     return element(
         "p", element("span", "distance to the truth: 0"), element("span", *boxes, class_="colours"),
@@ -123,7 +123,7 @@ def _numbers_of_worst(story: Story, window: above.Window, view: View) -> Markup:
 
 
 def frame_link(story: Story, position: int, text: str | None = None, **attributes: str) -> Markup:
-    """A link that sets the page's cursor to a frame."""
+    """Return a link that moves the page's cursor to a frame."""
     frames = story.run.frames
     told = f"frame {frames.index[position]}"
     label = text or f"{told}, {frames.seconds[position]:.2f} s"
@@ -132,7 +132,7 @@ def frame_link(story: Story, position: int, text: str | None = None, **attribute
 
 
 def _gaps(story: Story) -> IntArray:
-    """Before which poses of the path tracking failed, or much time passes."""
+    """Return before which poses the trajectory has a gap: a loss or a long pause."""
     run = story.run
     gaps = gaps_in_time(run.path.timestamps)
     failed = np.cumsum(~np.isin(run.frames.state, ["OK", "DROPPED"]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From where a path is looked at when it is drawn flat."""
+"""The view direction of a flat drawing of a trajectory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MORE = 2.0
 
 @dataclass(frozen=True)
 class View:
-    """Which axes of the first keyframe a picture shows, and what they are called."""
+    """The axes of the first keyframe in a picture, and their names."""
 
     right: int
     up: int
@@ -24,7 +24,7 @@ class View:
     up_name: str
 
     def flatten(self, positions: FloatArray) -> FloatArray:
-        """Positions (n, 3) to the picture's right and up, (n, 2)."""
+        """Return positions (n, 3) to the right and up in the picture, (n, 2)."""
         flat: FloatArray = positions[:, [self.right, self.up]] * np.array([1.0, self.up_sign])
         return flat
 
@@ -34,7 +34,7 @@ FROM_BEHIND = View(0, 1, -1.0, "right", "up")
 
 
 def choose_view(positions: FloatArray) -> View:
-    """Look from above, or from behind where the camera went up or down more than forward."""
+    """Return the view from above, or from behind if the motion is rather vertical."""
     if len(positions) < 2:
         return FROM_ABOVE
     extent = np.ptp(positions, axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plots over time as SVG that fills any width: lines keep theirs, and texts are HTML beside it."""
+"""Plots over time as SVG of any width: line widths are constant, and texts are HTML."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Line:
     x: FloatArray
     """Seconds, ascending, (n,)."""
     y: FloatArray
-    """(n,), nan where there is none."""
+    """(n,), nan for missing values."""
     look: str
-    """Class of its colour, in the page's style."""
+    """Colour class in the page's style."""
     kind: str = "line"
     """``line``, ``dots``, ``steps`` or ``area`` (down to zero)."""
 
@@ -65,7 +65,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Mark:
-    """A moment that something happened at."""
+    """A moment with an event."""
 
     x: float
     look: str
@@ -74,10 +74,10 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class TimePlot:
-    """What is to be drawn over the time of a run."""
+    """One plot over the time of a run."""
 
     name: str
-    """Of the plot, as the element's id."""
+    """Id of the plot's element."""
     title: str
     unit: str
     lines: list[Line]
@@ -89,7 +89,7 @@ class TimePlot:
     note: str | Markup = ""
     """Below the plot."""
     legend: tuple[tuple[str, str], ...] = ()
-    """Classes and names beside those of the lines."""
+    """Further classes and names for the legend."""
 
     @property
     def highest(self) -> float:
@@ -101,15 +101,15 @@ class TimePlot:
         return 1.06 * largest if largest > 0 else 1.0
 
     def across(self, x: FloatArray) -> FloatArray:
-        """Seconds to places in the drawing."""
+        """Convert seconds to positions in the drawing."""
         return WIDTH * np.asarray(x, np.float64) / (self.duration or 1.0)
 
     def down(self, y: FloatArray) -> FloatArray:
-        """Values to places in the drawing."""
+        """Convert values to positions in the drawing."""
         return HEIGHT * (1 - np.asarray(y, np.float64) / self.highest)
 
     def figure(self) -> Markup:
-        """Make the plot: caption, legend, drawing, axes."""
+        """Return the plot: caption, legend, drawing, axes."""
         legend = [(line.look, line.name) for line in self.lines if line.name]
         keys = [element("span", element("i", class_=look), name) for look, name in
                 (*legend, *self.legend)]  # fmt: skip
@@ -154,7 +154,7 @@ class TimePlot:
 
 
 def time_ticks(duration: float) -> Markup:
-    """Make the axis of time below a plot."""
+    """Return the time axis below a plot."""
     ticks = round_ticks(0.0, duration or 1.0, 6)
     texts = tick_texts(ticks)
     spans = [
@@ -173,7 +173,7 @@ def strip(
     duration: float,
     legend: list[tuple[str, str]],
 ) -> Markup:
-    """Make a band of states over time, with a row of ticks (keyframes) and of marks below it."""
+    """Return a band of states over time, with rows of ticks (keyframes) and of marks below it."""
     plot = TimePlot(name, title, "", [], duration)
     x = plot.across(ticks).tolist()
     svg = element(
@@ -223,5 +223,5 @@ def _mark(plot: TimePlot, mark: Mark) -> Markup:
 
 
 def figures(*plots: TimePlot | None) -> Markup:
-    """Draw those plots that there are."""
+    """Join those plots that exist."""
     return join(*(plot.figure() for plot in plots if plot is not None))

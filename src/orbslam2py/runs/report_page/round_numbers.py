@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Round numbers on axes, and lines of few points that look like those of many."""
+"""Round numbers for axes, and lines reduced to visible points."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def round_ticks(low: float, high: float, n: int) -> FloatArray:
     low, high
         The bounds, finite, `low` below `high`.
     n
-        About the largest number of them.
+        Approximate largest number of values.
 
     Returns
     -------
@@ -41,13 +41,13 @@ def round_ticks(low: float, high: float, n: int) -> FloatArray:
 
 
 def round_down(value: float) -> float:
-    """Largest of 1, 2, 5 times a power of ten that is not above a value over 0."""
+    """Return the largest of 1, 2, 5 times a power of ten that does not exceed a positive value."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(factor * power for factor in (1, 2, 5) if factor * power <= 1.001 * value)
 
 
 def tick_texts(ticks: FloatArray) -> list[str]:
-    """Write ticks with the decimals that tell them apart, and no more."""
+    """Write ticks with just enough decimals to distinguish them."""
     if len(ticks) < 2:
         return [short(float(tick)) for tick in ticks]
     step = float(ticks[1] - ticks[0])
@@ -70,12 +70,12 @@ def short(value: float, digits: int = 3) -> str:
 
 
 def thin(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Keep of a line what can be seen: in every bucket its lowest and its highest value.
+    """Keep the visible points of a line: the lowest and the highest value in each bucket.
 
     Parameters
     ----------
     x, y
-        (n,) each, x ascending; where y is nan the line is broken.
+        (n,) each, x ascending; nan in y interrupts the line.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def thin(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def path_data(x: FloatArray, y: FloatArray) -> str:
-    """Write a line as the ``d`` of an SVG path; nan breaks it, a single point becomes a dot."""
+    """Return a line as the ``d`` of an SVG path; nan interrupts it, one point becomes a dot."""
     said = []
     down = False
     broken = np.isnan(x) | np.isnan(y)
@@ -117,5 +117,5 @@ def path_data(x: FloatArray, y: FloatArray) -> str:
 
 
 def dots_data(x: FloatArray, y: FloatArray) -> str:
-    """Write points as the ``d`` of an SVG path, whose round line ends are the dots."""
+    """Return points as the ``d`` of an SVG path, whose round line ends form the dots."""
     return "".join(f"M{px:.1f} {py:.1f}h0" for px, py in zip(x.tolist(), y.tolist(), strict=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run has left in its folder, read back."""
+"""The files of a run, read from its folder."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _STATES = frozenset([*TrackingState.__members__, "SKIPPED", "DROPPED"])
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """The columns of frames.csv, (n,) each; nan where a field is empty."""
+    """The columns of frames.csv, (n,) each; nan for empty fields."""
 
     index: IntArray
     """Number in the sequence."""
@@ -49,7 +49,7 @@ class Frames:
     is_weak: npt.NDArray[np.bool_]
     """Whether the pose has weak evidence."""
     found: FloatArray
-    """Share of the points that should be in view that were found."""
+    """Visibility ratio: share of the points that should be in view that were found."""
     has_pose: npt.NDArray[np.bool_]
     """Whether there is a pose."""
     milliseconds: dict[str, FloatArray]
@@ -67,33 +67,33 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class RunFolder:
-    """A run as its files tell it."""
+    """A run from its files."""
 
     folder: Path
     report: dict[str, Any]
     frames: Frames
     path: Trajectory
-    """Of the main map, after the last optimisation."""
+    """Trajectory of the main map, after the last optimisation."""
     others: dict[int, Trajectory]
-    """Of the other maps, by their numbers, each in a frame of its own."""
+    """Trajectories of the other maps, by their numbers, each in its own frame."""
     keyframes: Trajectory
     truth: Trajectory | None
     """True poses in the frame and unit of `path`."""
     points: FloatArray
     """Map points (p, 3) in the frame and unit of `path`."""
     images: dict[int, bytes]
-    """JPEG of some frames by their number in the sequence."""
+    """JPEG images of some frames by their number in the sequence."""
     places: list[Path]
-    """Folders in which the files are looked for; each is taken from the first that has it."""
+    """Folders to search for the files; each file is read from the first that has it."""
 
     @cached_property
     def online(self) -> Trajectory:
-        """The path as first tracked, without gaps."""
+        """The trajectory at the time of tracking, without gaps."""
         return _read_path(self.places, "trajectory_online.txt")
 
     @cached_property
     def map(self) -> MapArrays | None:
-        """What is drawn of the main map; None if the file is not there.
+        """The drawing of the main map; None if the file does not exist.
 
         Raises
         ------
@@ -110,7 +110,7 @@ class RunFolder:
         Raises
         ------
         DatasetError
-            If the report names none that there is.
+            If the report names a file that does not exist.
         """
         try:
             return Sensor(self.report["sensor"])
@@ -125,18 +125,18 @@ class RunFolder:
 
     @property
     def is_monocular(self) -> bool:
-        """Whether lengths are in a unit of the map's own."""
+        """Whether lengths are in the map's own unit."""
         return self.report.get("sensor") == "mono"
 
     @property
     def metres(self) -> float:
-        """What lengths are multiplied by to be in `unit`."""
+        """Factor from lengths to `unit`."""
         scale = self.report.get("ate_scale")
         return float(scale) if self.is_monocular and scale else 1.0
 
     @property
     def unit(self) -> str:
-        """Of lengths, after they were multiplied by `metres`."""
+        """Unit of lengths after multiplication by `metres`."""
         return "units" if self.is_monocular and not self.report.get("ate_scale") else "m"
 
 
@@ -146,7 +146,7 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
     Raises
     ------
     DatasetError
-        If it is none, or what every run writes is not there or not whole.
+        If it is no run, or a file that every run writes is missing or incomplete.
     """
     places = [folders] if isinstance(folders, Path) else list(folders)
     report = _read_report(places)
@@ -189,7 +189,7 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
 
 
 def _check_number(file: Path, found: int, noun: str, told: Any) -> None:
-    """See that a file holds as much as the report tells of; an older one may tell nothing."""
+    """Check that a file is as long as the report says; older reports may not say it."""
     if isinstance(told, int) and told != found:
         raise DatasetError(
             f"{file} holds {number_of(found, noun)}, but report.json tells of {told}: it is cut, "
@@ -254,7 +254,7 @@ def read_frames(path: Path) -> Frames:
     Raises
     ------
     DatasetError
-        Naming the file, and the line if one is wrong.
+        The message names the file, and the line if one is invalid.
     """
     try:
         # Reasons hold names of files byte by byte; a page holds only what is UTF-8.

@@ -37,7 +37,7 @@ _SHOWN_PART = 0.995
 
 
 def error_plot(story: Story) -> TimePlot | None:
-    """Distance to the ground truth; None without one."""
+    """Return the distance to the ground truth; None without one."""
     if not story.has_truth:
         return None
     seconds = story.run.frames.seconds
@@ -60,7 +60,7 @@ def error_plot(story: Story) -> TimePlot | None:
 
 
 def state_strip(story: Story) -> Markup:
-    """States over time, keyframes and events below them."""
+    """Return states over time, with keyframes and events below them."""
     frames = story.run.frames
     seconds = frames.seconds
     there = Counter(_shown_states(frames).tolist())
@@ -88,7 +88,7 @@ def state_strip(story: Story) -> Markup:
 
 
 def inliers_plot(story: Story) -> TimePlot:
-    """Keypoints that agree with the pose."""
+    """Return the inliers of the pose."""
     frames = story.run.frames
     inliers = np.where(frames.state == "OK", frames.inliers, np.nan)
     return TimePlot(
@@ -103,7 +103,7 @@ def inliers_plot(story: Story) -> TimePlot:
 
 
 def found_plot(story: Story) -> TimePlot | None:
-    """Share of the points that should be in view that were found; None where nobody counted."""
+    """Return the visibility ratio; None if it was not counted."""
     frames = story.run.frames
     if not np.isfinite(frames.found).any():
         return None
@@ -124,7 +124,7 @@ def found_plot(story: Story) -> TimePlot | None:
 
 
 def keyframes_plot(story: Story) -> TimePlot:
-    """How many keyframes were made until each moment, and how many of these are left."""
+    """Return the number of keyframes created until each moment, and how many of these remain."""
     run = story.run
     seconds = run.frames.seconds
     ends = np.array([0.0, story.duration])
@@ -141,7 +141,7 @@ def keyframes_plot(story: Story) -> TimePlot:
 
 
 def times_plot(story: Story) -> TimePlot | None:
-    """Times of the stages on top of each other; None without any."""
+    """Return the times of the stages, stacked; None without any."""
     frames = story.run.frames
     stages = {name: frames.milliseconds.get(name) for name in STAGES}
     known = {name: np.nan_to_num(ms) for name, ms in stages.items() if ms is not None}
@@ -169,7 +169,7 @@ def times_plot(story: Story) -> TimePlot | None:
 
 
 def untracked(story: Story) -> list[Span]:
-    """When there was no pose, for the background of a plot."""
+    """Return the periods without a pose, for the background of a plot."""
     return [
         Span(span.begin, span.end, f"back {span.look}", span.title)
         for span in state_spans(story.run.frames)
@@ -178,7 +178,7 @@ def untracked(story: Story) -> list[Span]:
 
 
 def loop_marks(story: Story) -> list[Mark]:
-    """Moments at which the map was moved: closed loops, and maps that became one."""
+    """Return the moments at which the map moved: loop closures and merges."""
     seconds = story.run.frames.seconds
     return [
         Mark(float(seconds[event.position]), f"m-{event.kind}", event.text)
@@ -188,7 +188,7 @@ def loop_marks(story: Story) -> list[Mark]:
 
 
 def state_spans(frames: Frames) -> list[Span]:
-    """Stretches of frames in one state, each up to the next."""
+    """Return the periods of frames in one state, each up to the next."""
     if not len(frames):
         return []
     seconds = frames.seconds
@@ -208,20 +208,20 @@ def state_spans(frames: Frames) -> list[Span]:
 
 
 def _shown_states(frames: Frames) -> npt.NDArray[np.str_]:
-    """The states, with a state of its own for weak evidence."""
+    """Return the states, with a separate state for weak evidence."""
     shown: npt.NDArray[np.str_] = np.where(frames.is_weak & frames.has_pose, "WEAK", frames.state)
     return shown
 
 
 def _count(times: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """A staircase that goes up by one at each time, from the first of `ends` to the second."""
+    """Return a staircase with a step of one at each time, between the two `ends`."""
     x = np.concatenate([ends[:1], times, ends[1:]])
     y = np.concatenate([[0], np.arange(1, len(times) + 1), [len(times)]]).astype(float)
     return x, y
 
 
 def reasons_rows(frames: Frames, help_of: dict[str, str]) -> list[list[str | Markup]]:
-    """Reasons of frames without a pose: how many, and what helps."""
+    """Return the reasons of frames without a pose: numbers and remedies."""
     counts = Counter(
         (str(state), reason)
         for state, reason in zip(frames.state, frames.reason, strict=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page's script needs: the path in three dimensions, and values frame by frame."""
+"""Data for the page's script: the trajectory in three dimensions, and values for each frame."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FRAMES, _POINTS, _KEYFRAMES = 6000, 20000, 600
 
 
 def script_data(story: Story) -> Markup:
-    """All that the script needs, as JSON within an element of the page."""
+    """Return all data of the script, as JSON in an element of the page."""
     run = story.run
     shown = frames_shown(story)
     place = np.full(len(run.frames), -1, np.int64)
@@ -59,7 +59,7 @@ def script_data(story: Story) -> Markup:
 
 
 def as_script(data: dict[str, Any]) -> Markup:
-    """JSON that may stand in an element ``script``: nothing in it ends the element."""
+    """Return JSON for an element ``script``: nothing in it can end the element."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     for character in "<>&":
         text = text.replace(character, f"\\u{ord(character):04x}")
@@ -67,7 +67,7 @@ def as_script(data: dict[str, Any]) -> Markup:
 
 
 def frames_shown(story: Story) -> IntArray:
-    """Positions of the frames that the page knows: all, or of very many some and the special."""
+    """Return positions of frames for the page: all, or a selection with the special ones."""
     frames = story.run.frames
     n = len(frames)
     if n <= _FRAMES:
@@ -81,7 +81,7 @@ def frames_shown(story: Story) -> IntArray:
 
 
 def loop_ends(run: RunFolder) -> FloatArray:
-    """Positions of both ends of the loops of the main map, (l, 2, 3), in the unit of the page."""
+    """Return both ends of the loops of the main map, (l, 2, 3), in the unit of the page."""
     numbers = run.frames.map_index[np.isfinite(run.frames.map_index)]
     last_map = int(numbers[-1]) if len(numbers) else 0
     # Folders of earlier versions hold only what came last.
@@ -110,7 +110,7 @@ def _keyframes(run: RunFolder) -> dict[str, Any]:
 
 
 def _points(run: RunFolder) -> dict[str, Any]:
-    """Map points as 16-bit numbers within a box, base64; those far out are left out."""
+    """Return map points as 16-bit numbers within a box, base64, without very distant ones."""
     points = run.metres * run.points
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
@@ -136,7 +136,7 @@ def _nan(run: RunFolder) -> FloatArray:
 
 
 def rounded(values: FloatArray, digits: int) -> list[float | None]:
-    """Numbers with `digits` decimals; None for what is not finite."""
+    """Return numbers with `digits` decimals; None for values that are not finite."""
     known = np.isfinite(values).tolist()
     told = np.round(values, digits).tolist()
     make = int if digits == 0 else float

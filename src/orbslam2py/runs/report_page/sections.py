@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The parts of one run's page, from what stands first to what one looks up."""
+"""The sections of one run's page, in their order."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_EVENTS = 60
 
 
 def tiles(story: Story) -> Markup:
-    """The figures that are asked for first."""
+    """Return the most important figures."""
     report = story.run.report
     tracked = f"{report.get('tracked', 0)} of {report.get('frames', 0)}"
     part = f"frames tracked ({100 * report.get('tracked_fraction', 0.0):.1f} %)"
@@ -52,12 +52,12 @@ def tiles(story: Story) -> Markup:
 
 
 def _meaning(text: str) -> str | None:
-    """What a tile's words mean, where they are not plain."""
+    """Return the explanation of a tile's words, where needed."""
     return next((told for word, told in TERMS.items() if word in text), None)
 
 
 def error_section(story: Story) -> Markup | None:
-    """Error over time, and where it is worst; None without ground truth."""
+    """Return the error over time, and its largest values; None without ground truth."""
     plot = run_plots.error_plot(story)
     if plot is None:
         return None
@@ -76,7 +76,7 @@ def error_section(story: Story) -> Markup | None:
 
 
 def tracking_section(story: Story) -> Markup:
-    """States with reasons, inliers, keyframes, events."""
+    """Return states with reasons, inliers, keyframes, events."""
     frames = story.run.frames
     help_of = {reason: what_helps(reason) for reason in set(frames.reason)}
     rows = run_plots.reasons_rows(frames, help_of)
@@ -113,7 +113,7 @@ def time_section(story: Story) -> Markup:
 
 
 def images_section(story: Story) -> Markup | None:
-    """Images of some frames, with their points; None without any."""
+    """Return images of some frames, with their points; None without any."""
     run = story.run
     shown = []
     worst = {int(run.frames.index[moment.position]): k for k, moment in enumerate(story.worst, 1)}
@@ -150,7 +150,7 @@ def _image_text(story: Story, position: int, worst: int | None) -> str:
 
 
 def figures_section(story: Story) -> Markup:
-    """All figures of report.json with what they are."""
+    """Return all figures of report.json with explanations."""
     groups = []
     for title, group in FIGURES.items():
         rows: list[list[str | Markup]] = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long the stages took: their distributions, and how many frames were in time."""
+"""Times of the stages: their distributions, and how many frames were in time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HEIGHT = 200.0
 
 
 def stage_table(frames: Frames) -> Markup:
-    """Distribution of every stage of tracking: whiskers, quartiles, median, and figures."""
+    """Return the distribution of every stage of tracking: quartiles, median, and figures."""
     rows = {name: frames.milliseconds.get(name) for name in (*STAGES, "track")}
     times = {
         name: ms[np.isfinite(ms)]
@@ -97,7 +97,7 @@ def _figures_of(
 
 
 def histogram(frames: Frames) -> Markup | None:
-    """How long the track calls took, and how many of them are within the time between images."""
+    """Return the duration of track calls, and the share within the time between images."""
     ms = frames.milliseconds.get("track", np.zeros(0))
     ms = ms[np.isfinite(ms)]
     if not len(ms) or not ms.any():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What happened in a run, and when: its errors by frame, its events, its worst moments."""
+"""The history of a run: errors by frame, events, largest errors."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _FAST_TURN, _FEW_INLIERS = 45.0, 0.5
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at a frame."""
+    """An event at a frame."""
 
     position: int
-    """Of the frame in frames.csv."""
+    """Position of the frame in frames.csv."""
     kind: str
     """``loop``, ``relocalised``, ``lost``, ``map``, ``merge``."""
     text: str
@@ -34,7 +34,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame that is worth a look, and why."""
+    """A frame of interest, and why."""
 
     position: int
     value: float
@@ -50,15 +50,15 @@ class Story:
     of_path: IntArray
     """(k,) position in frames.csv of every pose of `RunFolder.path`."""
     errors: FloatArray
-    """(n,) distance of every frame to the ground truth [m], nan where it is not known."""
+    """(n,) distance of every frame to the ground truth [m], nan if unknown."""
     events: list[Event]
     """In the order of the frames."""
     worst: list[Moment]
-    """The largest errors that are some way apart, the largest first."""
+    """The largest errors with some distance between them, the largest first."""
 
     @classmethod
     def of(cls, run: RunFolder) -> Story:
-        """Tell it from the files."""
+        """Make the history from the files."""
         of_path = positions_of(run, run.path)
         errors = np.full(len(run.frames), np.nan)
         worst: list[Moment] = []
@@ -74,12 +74,12 @@ class Story:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last; frames that were skipped may go backwards."""
+        """Return seconds from the first frame to the last; times of skipped frames may decrease."""
         return float(max(self.run.frames.seconds, default=0.0))
 
     @property
     def has_truth(self) -> bool:
-        """Whether any error is known."""
+        """Return whether any error is known."""
         return bool(np.isfinite(self.errors).any())
 
 
@@ -106,7 +106,7 @@ def _events(run: RunFolder) -> list[Event]:
     events += [event for _, _, event in merges]
 
     def part_of(number: float, position: int) -> float:
-        """What a map was part of when a frame came."""
+        """Return the map that contained a map at the time of a frame."""
         for younger, older, event in merges:
             if number == younger and event.position <= position:
                 number = older
@@ -136,7 +136,7 @@ def _events(run: RunFolder) -> list[Event]:
 
 
 def _merges(run: RunFolder) -> list[tuple[int, int, Event]]:
-    """Maps that became part of another one, that one, and when, in the order of the report."""
+    """Return merged maps, the maps that contain them, and when, in the order of the report."""
     found = []
     for entry in run.report.get("merges", []) if len(run.frames) else []:
         text = f"map {entry['merged']} became part of map {entry['map']}: keyframe "
@@ -149,12 +149,12 @@ def _merges(run: RunFolder) -> list[tuple[int, int, Event]]:
 
 
 def _frame_at(run: RunFolder, seconds: float) -> int:
-    """Position of the frame whose time stamp is nearest."""
+    """Return the position of the frame with the nearest time stamp."""
     return int(np.argmin(np.abs(run.frames.timestamps - seconds)))
 
 
 def _found(run: RunFolder, events: list[Event]) -> str:
-    """Say that the camera was found: for the first time, in a loaded map, or again."""
+    """Return a text: the camera was found for the first time, in a loaded map, or again."""
     is_first = not any(event.kind == "relocalised" for event in events)
     if is_first and run.report.get("loaded_map") is not None:
         return "camera found in the loaded map"
@@ -162,7 +162,7 @@ def _found(run: RunFolder, events: list[Event]) -> str:
 
 
 def _what_happened(run: RunFolder, events: list[Event], position: int, place: int) -> str:
-    """Say what was unusual around a frame."""
+    """Return a text: what was unusual around a frame."""
     frames = run.frames
     near = np.abs(frames.timestamps - frames.timestamps[position]) <= _AROUND
     said = [event.text for event in events if near[event.position]]
@@ -184,7 +184,7 @@ def _what_happened(run: RunFolder, events: list[Event], position: int, place: in
 
 
 def _circumstances(run: RunFolder, position: int, place: int, usual: float) -> str:
-    """Say how the camera moved at a frame, what it saw, and how far the last keyframe was."""
+    """Return a text: motion of the camera, visible points, and distance of the last keyframe."""
     frames, path = run.frames, run.path
     near = np.flatnonzero(np.abs(path.timestamps - path.timestamps[place]) <= 0.5 * _AROUND)
     said = []
@@ -207,7 +207,7 @@ def _circumstances(run: RunFolder, position: int, place: int, usual: float) -> s
 
 
 def _mean_turn(path: Trajectory, rows: IntArray) -> float:
-    """Mean rate of rotation over some poses [deg/s]."""
+    """Return the mean angular velocity over some poses [deg/s]."""
     R = path.T_wc[rows, :3, :3]
     angles = rotation_angles(np.swapaxes(R[:-1], 1, 2) @ R[1:])
     passed = float(path.timestamps[rows[-1]] - path.timestamps[rows[0]])
@@ -215,7 +215,7 @@ def _mean_turn(path: Trajectory, rows: IntArray) -> float:
 
 
 def _fastest_turn(path: Trajectory, place: int) -> float:
-    """Largest rate of rotation around a pose [deg/s]."""
+    """Return the largest angular velocity around a pose [deg/s]."""
     near = np.abs(path.timestamps - path.timestamps[place]) <= _AROUND
     rows = np.flatnonzero(near)
     if len(rows) < 2:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is drawn of each of several maps, from a run or from a map file."""
+"""The drawn parts of several maps, from a run or from a map file."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class DrawnMap:
 
     number: int
     state: str
-    """``active``, ``rests``, ``given up``; empty if nobody is at work in it."""
+    """``active``, ``rests``, ``given up``; empty if no system uses it."""
     positions: FloatArray
-    """(n, 3) of the camera; lengths are those of the map."""
+    """(n, 3) positions of the camera, in the unit of the map."""
     gaps: npt.NDArray[np.bool_]
-    """(n,) whether the path is interrupted before each."""
+    """(n,) whether the trajectory is interrupted before each."""
     keyframes: FloatArray
     """(k, 3) positions."""
     points: FloatArray
@@ -50,7 +50,7 @@ class DrawnMap:
 
 
 def maps_of_run(result: RunResult) -> list[DrawnMap]:
-    """Take the maps of a run that have a path, also those that were given up, the oldest first."""
+    """Return the maps of a run with a trajectory, also dropped ones, the oldest first."""
     snapshots = {one.map_index: one for one in result.other_maps}
     snapshots[result.main_map] = result.snapshot
     drawn = []
@@ -65,13 +65,13 @@ def maps_of_run(result: RunResult) -> list[DrawnMap]:
 
 
 def maps_of_file(saved: SavedMap) -> list[DrawnMap]:
-    """Take all maps of a map file, the oldest first."""
+    """Return all maps of a map file, the oldest first."""
     numbers = np.unique(map_numbers(saved.contents.keyframes)).tolist()
     return [map_of_file(take_map(saved, number), number) for number in numbers]
 
 
 def map_of_file(saved: SavedMap, number: int) -> DrawnMap:
-    """Take a map file with one map: the paths of its runs, or of its keyframes without any."""
+    """Return a map file with one map: the trajectories of its runs, or else of its keyframes."""
     contents = saved.contents
     keyframes, points = contents.keyframes, contents.points
     paths = [saved.trajectory(run) for run in range(len(saved.runs))]
@@ -107,7 +107,7 @@ def _gaps(path: Trajectory, *, first: bool) -> npt.NDArray[np.bool_]:
 
 
 def _missing(indices: IntArray) -> npt.NDArray[np.bool_]:
-    """Whether frames that were lost are left out between two."""
+    """Return whether lost frames are left out between two."""
     return np.asarray(np.diff(indices) > 1)
 
 

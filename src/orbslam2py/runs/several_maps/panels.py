@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture of several maps: a panel for each."""
+"""The picture of several maps: one panel for each."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ _HEAD = 0.85
 def draw_maps(
     path: Path, maps: Sequence[DrawnMap], *, title: str, unit: str = "m", main: int | None = None
 ) -> None:
-    """Draw maps from above, each in its colour and in a world of its own, into a picture.
+    """Draw maps from above, each in its own colour and world, into a picture.
 
     Parameters
     ----------
     path : Path
-        Where to write; the ending tells the format, and without one it is PNG.
+        The file; its suffix determines the format, PNG without one.
     maps : sequence of DrawnMap
         At least one.
     title : str
         First line above the picture.
     unit : str
-        Unit of length, for the axes; of a single camera's maps each has its own.
+        Unit of length for the axes; each map of a single camera has its own.
     main : int, optional
-        Number of the map that the figures of a run are of.
+        Number of the map of the run's figures.
 
     Raises
     ------
     OutputFileError
-        If the ending is that of no format of pictures that is known here.
+        If the suffix is of no known format of pictures.
     OSError
         If the file cannot be written.
     """

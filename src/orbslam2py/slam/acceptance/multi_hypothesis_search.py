@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Other ways to a pose whose evidence fell suddenly; the best supported one wins.
+"""Search of other hypotheses when the evidence of a pose falls; the best supported one wins.
 
 ``docs/method/tracking.md#harder-search``.
 """
@@ -28,7 +28,7 @@ Way = Callable[[core.TrackedFrame, State], tuple[PoseEstimate, State]]
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A pose, what found it, and what speaks for it."""
+    """A pose, the method that found it, and its evidence."""
 
     refined: RefinedPose
     method: PoseMethod
@@ -36,17 +36,17 @@ class Hypothesis:
 
     @property
     def n_inliers(self) -> int:
-        """Of the pose in the local map."""
+        """The evidence of the pose in the local map."""
         return self.refined.estimate.n_inliers
 
 
 class MultiHypothesisSearch:
-    """Tries ways that do not hang on the speed.
+    """Tries methods that do not depend on the velocity.
 
     Parameters
     ----------
     search : PoseSearch
-        The ways to a pose.
+        Estimates poses.
     judge : PoseValidator
         Weighs what they find.
     """
@@ -65,15 +65,15 @@ class MultiHypothesisSearch:
         frame : orbslam2py._core.TrackedFrame
             The frame; it is not changed.
         first : Hypothesis or None
-            What is in doubt; None if nothing was found.
+            The pose in doubt; None if nothing was found.
         state : State
             The state before the frame.
 
         Returns
         -------
         Hypothesis or None
-            The best supported one, `first` itself unless another one is clearly better; None if
-            nothing was found.
+            The hypothesis with the strongest evidence: `first`, unless another one is clearly
+            better; None if nothing was found.
         State
             As relocalization leaves it.
         """
@@ -95,7 +95,7 @@ class MultiHypothesisSearch:
         method: PoseMethod,
         state: State,
     ) -> bool:
-        """Add the hypothesis of an estimate, if it holds; whether the search may end with it."""
+        """Add an estimate that found a pose; return whether the search may end."""
         if not estimate.found:
             return False
         refined = self._search.local_map_search.refine(version, estimate, state)
@@ -132,7 +132,7 @@ class MultiHypothesisSearch:
         return self._search.around_prediction(frame, state.motion, _WIDE_WINDOW)
 
     def _has_enough(self, hypothesis: Hypothesis, others: list[Hypothesis]) -> bool:
-        """Whether it is no use to look further."""
+        """Whether further methods cannot improve the result."""
         if hypothesis.evidence.inliers_to_usual >= _ENOUGH:
             return True
         return any(self._confirms(hypothesis, other) for other in others)

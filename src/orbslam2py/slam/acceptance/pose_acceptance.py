@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From a first estimate to a pose that is believed, or not.
+"""From a first estimate to an accepted or rejected pose.
 
 ``docs/method/tracking.md#evidence``.
 """
@@ -19,14 +19,14 @@ _WEAK_FRAMES = 2  # uncertain ones in a row, after which a confirmed one may bec
 
 
 class PoseAcceptance:
-    """Refines poses in the local map, weighs them, and has them searched again when in doubt.
+    """Refines poses in the local map, validates them, and searches other hypotheses in doubt.
 
     Parameters
     ----------
     search : PoseSearch
-        The ways to a pose.
+        Estimates poses.
     judge : PoseValidator
-        Says how much speaks for one.
+        Validates poses by their evidence.
     harder_search : MultiHypothesisSearch
         Looks again.
     """
@@ -46,12 +46,12 @@ class PoseAcceptance:
         *,
         fixed_map: bool = False,
     ) -> tuple[PoseEstimate, State]:
-        """Give a frame the pose with the strongest evidence, if that is strong enough.
+        """Estimate the pose with the strongest evidence, and accept or reject it.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            With the pose and the associations of the first estimate, if that was found.
+            It has the pose and the associations of the first estimate, if there is one.
         first : PoseEstimate
             The first estimate.
         state : State
@@ -88,7 +88,7 @@ class PoseAcceptance:
         return Hypothesis(refined, first.method, evidence)
 
     def _rematched(self, hypothesis: Hypothesis, state: State, *, in_doubt: bool) -> Hypothesis:
-        """In a fixed map an image has one pose, whatever frame came before it."""
+        """In a fixed map, the pose of an image must not depend on the frames before it."""
         refined, evidence = hypothesis.refined, hypothesis.evidence
         rematched = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         if rematched is refined:
@@ -134,12 +134,12 @@ class PoseAcceptance:
         return estimate, replace(state, scene=scene)
 
     def allows_keyframe(self, evidence: Evidence | None, state: State) -> tuple[bool, State]:
-        """Whether a frame with this evidence may become a keyframe; once for each frame."""
+        """Return whether a frame may become a keyframe; called once for each frame."""
         if evidence is None or evidence.verdict is Verdict.STRONG:
             return True, replace(state, n_uncertain=0)
         allowed = self._may_count(evidence, state)
         return allowed, replace(state, n_uncertain=state.n_uncertain + 1)
 
     def _may_count(self, evidence: Evidence, state: State) -> bool:
-        """Whether a weak frame counts as usual: not the first in a row, and confirmed."""
+        """Return whether a weak frame is treated as strong: confirmed, not the first."""
         return evidence.confirmed and state.n_uncertain >= _WEAK_FRAMES

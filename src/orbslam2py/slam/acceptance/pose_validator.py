@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Weighs a pose by what should have been seen, against the frames before.
+"""Validation of a pose: compare its evidence with that of the frames before.
 
 ``docs/method/tracking.md#evidence``.
 """
@@ -21,7 +21,7 @@ _SAME_DEVIATIONS = 3.0  # standard deviations of the position that they may diff
 
 
 class PoseValidator:
-    """Knows what is usual, and says how far a pose is from it.
+    """Compares a pose with the running means of the scene.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ class PoseValidator:
         )
 
     def needs_reestimation(self, evidence: Evidence) -> bool:
-        """Whether the pose has to be searched by other ways before it is believed."""
+        """Return whether other methods must search the pose before it is accepted."""
         limits = self.limits
         return (
             evidence.verdict is not Verdict.STRONG
@@ -101,7 +101,7 @@ class PoseValidator:
         )
 
     def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
-        """Whether two poses of a frame are one, as far as can be told."""
+        """Return whether two poses of a frame are equal within their uncertainty."""
         T_first, T_second = first.frame.T_cw, second.frame.T_cw
         if T_first is None or T_second is None:
             return False
@@ -110,7 +110,7 @@ class PoseValidator:
         return self._windows(turn) < _SAME_WINDOWS and move <= _SAME_DEVIATIONS * deviations
 
     def confirm(self, evidence: Evidence) -> Evidence:
-        """A second method came to the same pose: it is believed, though weak evidence stays so."""
+        """A second method found the same pose: accept it, but weak evidence stays weak."""
         refused = evidence.verdict is Verdict.REFUSED
         verdict = Verdict.WEAK if refused else evidence.verdict
         return replace(evidence, confirmed=True, verdict=verdict)
@@ -122,7 +122,7 @@ class PoseValidator:
         motion: Motion,
         innovation: FloatArray | None,
     ) -> FloatArray | None:
-        """Return the covariance (6, 6) that is stated with a pose; None if it is not known.
+        """Return the stated covariance (6, 6) of a pose; None if it is not known.
 
         It is cluster-robust: residuals of neighbouring keypoints may have errors in common. It
         grows with the median error of all matches, because the inliers of a wide distribution look
@@ -135,7 +135,7 @@ class PoseValidator:
         refined : RefinedPose
             The pose.
         match_error : float
-            Median error of its matches, outliers too, in standard deviations.
+            Median error of its matches, with outliers, in standard deviations.
         motion : Motion
             The last frame and the velocity.
         innovation : array of float64, (6,), or None
@@ -153,12 +153,12 @@ class PoseValidator:
         return core.widened_covariance(refined.spread.covariance, scale**2, known)
 
     def _windows(self, degrees: float) -> float:
-        """How far a turn moves the image, in search windows of the motion model."""
+        """Return how far a rotation moves the image, in search windows of the motion model."""
         return self._focal_length * math.radians(degrees) / self._window
 
 
 def statistics_of(refined: RefinedPose) -> PoseStatistics:
-    """Return what the running means of the scene take from a pose."""
+    """Return the numbers of a pose for the running means of the scene."""
     estimate = refined.estimate
     n_inliers = estimate.n_inliers
     return PoseStatistics(
@@ -173,7 +173,7 @@ def _ratio(value: float, usual: float) -> float:
 
 
 def _changes(frame: core.TrackedFrame, motion: Motion) -> tuple[float, float]:
-    """Degrees and metres by which a frame moved otherwise than the frame before it."""
+    """Return the degrees and metres by which a frame differs from the predicted motion."""
     if motion.last_frame is None:
         return 0.0, 0.0
     T_cl, T_lw, T_cw = motion.predicted(frame.timestamp), motion.last.T_cw, frame.T_cw

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The frames before a single camera's map began, tracked in it.
+"""Tracks the frames before a single camera's map began in this map.
 
 ``docs/method/start.md#earlier-frames``.
 """
@@ -26,9 +26,9 @@ class EarlierFrames:
     Parameters
     ----------
     search : PoseSearch
-        The ways to a pose; its own, not the tracker's.
+        Estimates poses; not shared with the tracker.
     acceptance : PoseAcceptance
-        Whether enough speaks for a pose; of the same search.
+        Validates poses; of the same search.
     """
 
     def __init__(self, search: PoseSearch, acceptance: PoseAcceptance) -> None:
@@ -37,26 +37,26 @@ class EarlierFrames:
         self._tracked: tuple[core.TrackedFrame, ...] = ()
 
     def take(self) -> tuple[core.TrackedFrame, ...]:
-        """What was tracked, in the order of time; once."""
+        """Return the tracked frames in the order of time, once."""
         tracked, self._tracked = self._tracked, ()
         return tracked
 
     def track(
         self, history: list[core.TrackedFrame], first: core.TrackedFrame
     ) -> list[core.TrackedFrame]:
-        """Give poses to the frames of a history before its last, as far as they are found.
+        """Estimate poses of the frames of a history before its last one.
 
         Parameters
         ----------
         history : list of TrackedFrame
-            In the order of time; the last one has begun the map.
+            In the order of time; the last frame has begun the map.
         first : TrackedFrame
-            The first view, which is in the history and has its pose.
+            The first view, which is in the history and has a pose.
 
         Returns
         -------
         list of TrackedFrame
-            Those found between the first view and the last frame, in the order of time.
+            The frames with poses between the first view and the last frame, in the order of time.
         """
         at = next(i for i, frame in enumerate(history) if frame.id == first.id)
         before = self._follow(first, reversed(history[:at]))
@@ -67,7 +67,7 @@ class EarlierFrames:
     def _follow(
         self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]
     ) -> list[core.TrackedFrame]:
-        """Track one frame after the other until several are not found."""
+        """Track frames in this order, until several in a row have no pose."""
         state = State(
             phase=TrackingState.OK,
             motion=Motion().remembering(first, None),
@@ -106,16 +106,16 @@ class EarlierFrames:
 
 
 def _is_strong(estimate: PoseEstimate) -> bool:
-    """Whether enough speaks for a pose that nobody waits for: left out, it costs one frame.
+    """Return whether the evidence suffices for a past frame; a frame left out costs little.
 
-    A second way to it is not enough. In a map of two views, where it ends, all ways can be
-    misled alike.
+    Confirmation by a second method does not suffice. At the border of a map of two views, all
+    methods can be wrong together.
     """
     return estimate.evidence is not None and estimate.evidence.verdict is Verdict.STRONG
 
 
 def _is_exact(estimate: PoseEstimate) -> bool:
-    """Whether a pose is known so well that a path may hold it, which says nothing of deviations."""
+    """Return whether a pose is certain enough for a trajectory without covariances."""
     covariance = estimate.covariance
     if covariance is None:
         return False

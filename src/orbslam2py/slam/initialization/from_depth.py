@@ -35,7 +35,7 @@ class DepthInitializer(Initializer):
     mapping : LocalMapping
         Takes it.
     n_features : int
-        How many are extracted: with few of them, fewer keypoints are enough.
+        Number of features extracted per image: with few, fewer keypoints are sufficient.
     config : InitializationConfig
         Limits.
     """
@@ -55,11 +55,11 @@ class DepthInitializer(Initializer):
         self._least = min(limits.keypoints_with_depth_sensor, int(_MOST * n_features))
 
     def shows_enough(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame has the keypoints that a map needs to begin."""
+        """Return whether a frame has enough keypoints to begin a map."""
         return frame.features.size > self._least
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Make the frame the first keyframe, with a point for every depth; or say why not."""
+        """Make the frame the first keyframe, with points from its depths; or return a reason."""
         if not self.shows_enough(frame):
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A map from two views of a single camera that a third agrees with.
+"""A map from two views of a single camera, confirmed by a third view.
 
 Mur-Artal, Montiel and Tardos, 2015, section IV; ``docs/method/start.md#one-camera``.
 """
@@ -50,7 +50,7 @@ _REASONS = {
 
 
 class MonocularInitializer(Initializer):
-    """Keeps views of the last moments and begins a map from the one that fits best to the last.
+    """Keeps recent views and begins a map from the one that fits the last frame best.
 
     The frame of that view becomes the world's frame; its median depth becomes 1. A third view
     must agree. The frames before and between are then tracked in the map.
@@ -103,7 +103,7 @@ class MonocularInitializer(Initializer):
         self._shown: View | None = None
 
     def remember(self, frame: core.TrackedFrame) -> None:
-        """A frame that was tracked in a young map, which may yet come to nothing."""
+        """Keep a frame that was tracked in a young map, in case this map is dropped."""
         self._history.append(frame)
 
     def remembered(self) -> list[core.Frame]:
@@ -111,7 +111,7 @@ class MonocularInitializer(Initializer):
         return [frame.features for frame in self._history]
 
     def restart(self, frames: list[core.Frame]) -> None:
-        """Begin anew, with the views of the last moments of an earlier attempt."""
+        """Start again, with the recent views of an earlier attempt."""
         self.reset()
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
@@ -122,20 +122,20 @@ class MonocularInitializer(Initializer):
             self._kept.keep_last()
 
     def n_between(self, map_index: int) -> int:
-        """Living keyframes that a map began with, beyond the two that it needs."""
+        """Living keyframes of the start, beyond the two that a map needs."""
         if map_index != self._begun_map:
             return 0
         return sum(self._map.living(keyframe) == keyframe for keyframe in self._between)
 
     @property
     def feature_factor(self) -> int:
-        """Twice the features of the settings, and more when it takes long to begin."""
+        """Return twice the features of the settings, and more if the start takes long."""
         limits = self._limits
         waited = self._n_waiting >= _PATIENCE or self._waited >= _PATIENCE_SECONDS
         return limits.raised_feature_factor if waited else limits.feature_factor
 
     def lines(self) -> FloatArray | None:
-        """From each keypoint of the first view to its match in the last frame, (m, 4) pixels."""
+        """Return pixels of the first view and of their matches in the last frame, (m, 4)."""
         if self._shown is None or self._last is None:
             return np.zeros((0, 4))
         matched = np.flatnonzero(self._shown.matches >= 0)
@@ -144,15 +144,15 @@ class MonocularInitializer(Initializer):
         return np.hstack([seen_first, seen_last]).astype(np.float64)
 
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
-        """Frames before the one that began the map, with their poses in it, in order; once."""
+        """Return the frames before the one that began the map, with poses in it, in order; once."""
         return self._earlier.take()
 
     def shows_enough(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame has the keypoints that a map needs to begin."""
+        """Return whether a frame has enough keypoints to begin a map."""
         return frame.features.size > self._limits.keypoints
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Begin the map with this frame as second view; or say why not."""
+        """Begin the map with this frame as second view; or return the reason why not."""
         if self._n_waiting == 0:
             self._waits_since = frame.timestamp
         self._n_waiting += 1
@@ -175,7 +175,7 @@ class MonocularInitializer(Initializer):
         return reason
 
     def _from_best_pair(self, frame: core.TrackedFrame) -> Reason:
-        """Try all views with this frame, the ones that moved furthest first."""
+        """Try all views with this frame, those with the largest motion first."""
         reason = Reason.LOW_PARALLAX
         candidates: list[Candidate] = []
         for view in self._tried_views():
@@ -202,7 +202,7 @@ class MonocularInitializer(Initializer):
         return reason
 
     def _tried_views(self) -> list[View]:
-        """A few of the views that have moved far enough, spread from the furthest on."""
+        """Return a few of the views that have moved enough, from the largest motion on."""
         limits = self._limits
         moved = [view for view in self._kept.views if view.displacement >= limits.displacement]
         moved.sort(key=lambda view: -view.displacement)
@@ -237,14 +237,14 @@ class MonocularInitializer(Initializer):
         return Reason.NONE
 
     def _adds(self, frame: core.TrackedFrame, n_points: int) -> bool:
-        """Whether a frame between the two views is a kept one that sees the points otherwise."""
+        """Return whether a kept view between the two contradicts the points."""
         kept = any(view.frame.id == frame.id for view in self._kept.views)
         return kept and frame.n_associated() < self._limits.view_between * n_points
 
     def _insert_views(self, frames: list[core.TrackedFrame]) -> None:
         """Make keyframes of views between the two that began the map.
 
-        All views have chosen its motion; two alone would let bundle adjustment bend it again.
+        All views have chosen the motion; with two alone, bundle adjustment would change it again.
         """
         self._begun_map, self._between = self._map.active_map, []
         for frame in frames:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How an image moves from one frame to the next, as a smooth function of the place in it."""
+"""Motion of an image from one frame to the next, as a smooth function of the position in it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _LEAST_SPREAD = 1.0  # pixels: rounder than that no keypoint is
 
 
 class ImageMotion:
-    """Displacements that are a quadratic function of the place: turning, coming nearer, a slope.
+    """Displacements that are a quadratic function of the position: rotation, approach, slope.
 
     Parameters
     ----------
     centre, extent
-        Of the image, (2,) pixels: places are measured from the centre in units of the extent.
+        Of the image, (2,) pixels: positions are relative to the centre, in units of the extent.
     """
 
     def __init__(self, centre: FloatArray, extent: FloatArray) -> None:
@@ -36,14 +36,14 @@ class ImageMotion:
         return self._centre, self._extent
 
     def at(self, places: Pixels) -> Pixels:
-        """Displacements (n, 2) of places (n, 2), pixels."""
+        """Return displacements (n, 2) of positions (n, 2), pixels."""
         return np.asarray(self._basis(places) @ self._coefficients, np.float32)
 
     def fit(self, places: Pixels, displacements: Pixels) -> None:
-        """Fit to matches, (n, 2) and (n, 2) pixels, most of which are right.
+        """Fit the function to matches, (n, 2) and (n, 2) pixels, most of which are correct.
 
         Iterated weighted least squares with Cauchy's weights, begun at the median (Hartley and
-        Zisserman, appendix 6.8). With too few matches the function stays as it was.
+        Zisserman, appendix 6.8). With too few matches the function is unchanged.
         """
         if len(places) < _FEWEST:
             return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The views of the last moments, each matched with every frame that comes."""
+"""Recent views, each matched with every new frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _WIDE, _NARROW = 2.0, 0.25  # search windows after a failure and around a predic
 
 
 class View:
-    """A frame that was kept, and where its keypoints have moved to.
+    """A kept frame, and the present positions of its keypoints.
 
     Parameters
     ----------
@@ -30,11 +30,11 @@ class View:
     frame
         The frame.
     positions
-        Where its keypoints are, or would be, in the last frame, (n, 2) pixels.
+        Positions of its keypoints in the last frame, measured or predicted, (n, 2).
     matches
         Per keypoint the index in the last frame or -1, (n,).
     displacement
-        Median distance that matched keypoints have moved since [pixels].
+        Median displacement of matched keypoints since this view [pixels].
     """
 
     def __init__(self, frame: core.Frame) -> None:
@@ -52,7 +52,7 @@ class View:
         return int(np.count_nonzero(self.matches >= 0))
 
     def follow(self, frame: core.Frame, seen: Pixels, motion: ImageMotion, window: float) -> None:
-        """Match with the next frame, whose keypoints are `seen`, around where things move to."""
+        """Match with the next frame, whose keypoints are `seen`, around the predicted positions."""
         expected = self.positions + motion.at(self.positions)
         matches = core.match_views(self.frame, frame, expected, window=window)
         found = _one_per_place(self.keypoints, matches)
@@ -64,19 +64,19 @@ class View:
         self.displacement = float(np.median(np.linalg.norm(moved, axis=1))) if len(found) else 0.0
 
     def link(self, later: View) -> None:
-        """Note what the last frame, now a view of its own, shows of these keypoints."""
+        """Store the matches of these keypoints in the last frame, which becomes a view itself."""
         self._linked[later.frame.id] = self.matches
 
     def unlink_all_but(self, kept: set[int]) -> None:
-        """Forget what was noted of views of other frames than those with these ids."""
+        """Drop the stored matches with other views than those with these ids."""
         self._linked = {frame: links for frame, links in self._linked.items() if frame in kept}
 
     def partners(self, other: View) -> Indices:
-        """Per keypoint of this view the index in another view that the last frame links it to."""
+        """Return per keypoint of this view its index in another view, linked by the last frame."""
         return _inverse(other.matches, int(self.matches.max(initial=-1)) + 1)[self.matches]
 
     def all_partners(self, other: View) -> Indices:
-        """The same, and what was matched when one of the two was the last frame."""
+        """Return these links, and the matches stored when one of the two was the last frame."""
         partners = self.partners(other)
         if other.frame.id in self._linked:
             then = self._linked[other.frame.id]
@@ -91,9 +91,9 @@ class View:
 
 
 def _inverse(matches: Indices, n: int) -> Indices:
-    """Per keypoint of the matched frame, `n` or more, the one matched with it; -1 for none.
+    """Per keypoint of the matched frame, `n` or more, its match; -1 for none.
 
-    The last entry is -1, too: what is not matched, -1, has no partner.
+    The last entry is -1 too, so that the index -1 (no match) gives -1.
     """
     back = np.full(max(n, int(matches.max(initial=-1)) + 1) + 1, -1, np.int32)
     matched = np.flatnonzero(matches >= 0)
@@ -102,10 +102,9 @@ def _inverse(matches: Indices, n: int) -> Indices:
 
 
 def _one_per_place(keypoints: Pixels, matches: Indices) -> npt.NDArray[np.int64]:
-    """Matched keypoints of which no two lie within the same two pixels.
+    """Return matched keypoints, at most one in each cell of two by two pixels.
 
-    A corner gives keypoints on several levels, of which the first, finest one is kept: counted
-    twice it would weigh twice.
+    A corner gives keypoints on several levels; only the finest one is kept, so that it counts once.
     """
     found = np.flatnonzero(matches >= 0)
     cells = np.floor(keypoints[found] / 2).astype(np.int64)
@@ -119,14 +118,14 @@ class InitialViews:
     Parameters
     ----------
     limits
-        Windows, counts and how many are kept.
+        Search windows, counts, and the number of views to keep.
 
     Attributes
     ----------
     views
-        Those that a map may begin from, oldest first.
+        Views that a map may begin from, oldest first.
     distant
-        Those that see too little of the last frame for that, but may confirm what is begun.
+        Views with too few matches to begin a map; they may confirm one.
     """
 
     def __init__(self, limits: InitializationConfig) -> None:
@@ -142,7 +141,7 @@ class InitialViews:
         self._n_usual = 0
 
     def follow(self, frame: core.Frame) -> None:
-        """Match all views with the next frame; those that have lost too much are let go."""
+        """Match all views with the next frame; drop those with too few matches."""
         limits, last = self._limits, self._last
         seen: Pixels = frame.keypoints
         if last is not None:
@@ -156,7 +155,7 @@ class InitialViews:
         self._last = View(frame)
 
     def _let_go(self) -> None:
-        """Sort views by how many matches they have left: those that may begin, confirm, or go."""
+        """Sort views by their remaining matches: for starts, for confirmation, the rest."""
         limits = self._limits
         lost = [view for view in self.views if view.n_matches < limits.matches]
         self.views = [view for view in self.views if view.n_matches >= limits.matches]
@@ -165,7 +164,7 @@ class InitialViews:
         self.distant = distant[-_DISTANT_VIEWS:]
 
     def _follow_image(self, last: View, frame: core.Frame, seen: Pixels) -> ImageMotion:
-        """The motion from the last frame, searched in wide windows around where it would lead."""
+        """Return the motion from the last frame, searched in wide windows around its prediction."""
         if self._motion is None:
             pinhole = frame.camera.pinhole
             centre = np.array([pinhole.cx, pinhole.cy])
@@ -188,7 +187,7 @@ class InitialViews:
         return self._motion
 
     def keep_last(self) -> None:
-        """Keep the last frame as a view, if it shows enough that is new."""
+        """Keep the last frame as a view, if it shows enough new parts of the scene."""
         last, views = self._last, self.views
         if last is None or (views and views[-1].displacement < self._limits.displacement):
             return

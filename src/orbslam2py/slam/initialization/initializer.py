@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tracking asks of whatever begins a map."""
+"""Interface between tracking and the initializers."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from orbslam2py.slam.records import Reason
 
 
 class Initializer(ABC):
-    """Begins a map from the frames that come.
+    """Begins a map from incoming frames.
 
-    One that begins a map with one frame keeps nothing from frame to frame: so are the defaults.
+    The defaults fit an initializer that needs one frame and keeps none.
     """
 
     @abstractmethod
     def shows_enough(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame has the keypoints that a map needs to begin."""
+        """Return whether a frame has enough keypoints to begin a map."""
 
     @abstractmethod
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun).
+        """Begin the map with this frame; or return a reason (`Reason.NONE`: it has begun).
 
         Parameters
         ----------
@@ -32,37 +32,37 @@ class Initializer(ABC):
 
     @property
     def feature_factor(self) -> int:
-        """How many features the next frame needs, in multiples of the settings' number."""
+        """Return the features of the next frame, in multiples of the settings' number."""
         return 1
 
     def lines(self) -> FloatArray | None:
-        """What the last frame was matched with, for those who watch.
+        """Return the matches of the last frame, for viewers.
 
         Returns
         -------
         array (m, 4) or None
             Pixels of the images as given: x and y in the first view, then in the last frame. None
-            where a map does not begin from two views.
+            if a map does not begin from two views.
         """
         return None
 
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
-        """Frames before the one that began the map, with their poses in it, in order; once."""
+        """Return the frames before the one that began the map, with poses in it, in order; once."""
         return ()
 
     def n_between(self, map_index: int) -> int:
-        """Living keyframes that a map began with, beyond those that it needs."""
+        """Living keyframes of the start, beyond those that a map needs."""
         return 0
 
     def remembered(self) -> list[core.Frame]:
-        """What a new map may begin from, if the young one came to nothing."""
+        """Return the frames that a new map may begin from, if the young map is dropped."""
         return []
 
     def remember(self, frame: core.TrackedFrame) -> None:  # noqa: B027
-        """Keep a frame that was tracked in a young map, which may yet come to nothing."""
+        """Keep a frame that was tracked in a young map, in case this map is dropped."""
 
     def reset(self) -> None:  # noqa: B027
         """Forget the frames before."""
 
     def restart(self, frames: list[core.Frame]) -> None:  # noqa: B027
-        """Begin anew, with frames remembered from before."""
+        """Start again, with frames of an earlier attempt."""

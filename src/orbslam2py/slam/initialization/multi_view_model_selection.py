@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The motion between two views by all views that see the same points: what a map begins with.
+"""The motion between two views, chosen by all views that see the same points.
 
-Two views with little parallax fit more than one motion, a matrix from eight of their matches may
-give any of them, and one third view agrees with many. All views together tell them apart.
-``docs/method/start.md#all-views-together``.
+With little parallax, several motions fit two views, and one third view often agrees with more than
+one of them. All views together can decide. ``docs/method/start.md#all-views-together``.
 """
 
 from __future__ import annotations
@@ -38,12 +37,12 @@ _COLLAPSED = 1e-9  # of the way before the adjustment
 
 @dataclass(frozen=True)
 class _Sightings:
-    """Where one view sees the keypoints of the first view that the last frame sees too.
+    """Keypoints of one view that match those of the first view and the last frame.
 
     Attributes
     ----------
     rows
-        Which of these keypoints it sees, (n,).
+        Mask of the keypoints with a match in this view, (n,).
     pixels
         Where, (n, 2).
     inverse_sigma2
@@ -56,7 +55,7 @@ class _Sightings:
 
     @staticmethod
     def of(frame: core.Frame, rows: np.ndarray, keypoints: np.ndarray) -> _Sightings:
-        """What a frame sees: its keypoint per row."""
+        """What a frame sees: one row for each keypoint."""
         return _Sightings(
             rows,
             frame.keypoints[keypoints].astype(np.float64),
@@ -75,12 +74,12 @@ class _Placed:
 
 
 class MultiViewModelSelection:
-    """A view that a map may begin from, the last frame, and the other views of the same things.
+    """A view that a map may begin from, the last frame, and other views of the same points.
 
     Parameters
     ----------
     candidate
-        The first view, with motions that other views agree with.
+        The first view, with the motions that other views support.
     thirds
         The other views.
     last
@@ -113,14 +112,14 @@ class MultiViewModelSelection:
         self._fewest_common = thirds.fewest_common
 
     def best_motion(self, motions: Sequence[Motion], seed: int) -> core.TwoViewMotion | None:
-        """The motion that all views agree with best; None if they do not tell it from another.
+        """Return the motion that fits all views best; None if it is ambiguous.
 
         Parameters
         ----------
         motions
-            The one that third views agree with, and those that fit them nearly as well.
+            The motion that third views support best, and those that fit nearly as well.
         seed
-            Of the further draws that give others to compare with.
+            Of the further samples, which give motions for comparison.
         """
         limits = self._limits
         is_ambiguous = len(motions) > 1
@@ -142,7 +141,7 @@ class MultiViewModelSelection:
     def _told_apart(
         self, judged: Sequence[tuple[_Placed, float]], *, is_ambiguous: bool
     ) -> core.TwoViewMotion | None:
-        """The motion that costs least, if it costs clearly less than those that lead elsewhere."""
+        """Return the motion of least cost, if different motions cost clearly more."""
         limits = self._limits
         other, worse = limits.other_direction, limits.clearly_worse_direction
         if is_ambiguous:
@@ -156,7 +155,7 @@ class MultiViewModelSelection:
     def _judged(
         self, motions: Sequence[Motion], seed: int, draw: int
     ) -> list[tuple[_Placed, float]]:
-        """What comes of each motion of a draw, with its cost; draw 0 are the motions given."""
+        """Return the result and cost of each motion of a sample; sample 0 has the given motions."""
         drawn = motions
         if draw > 0:
             result = reconstruct(self._view, self._last, seed + draw)
@@ -165,10 +164,10 @@ class MultiViewModelSelection:
 
     # ---- adjustment ------------------------------------------------------------------------------
     def _refined(self, motion: Motion) -> tuple[_Placed, float]:
-        """Adjust motion, points and the other views' poses while that fits better; with the cost.
+        """Adjust motion, points and other views' poses while the cost falls; return with the cost.
 
-        With little parallax an adjustment may end where no point is placed at all. That says
-        nothing against the motion that it began with.
+        With little parallax, an adjustment may end without any valid point. Then the motion before
+        the adjustment remains valid.
         """
         placed = self._place(motion.T_21)
         cost = self._cost(placed)
@@ -181,9 +180,9 @@ class MultiViewModelSelection:
         return placed, cost
 
     def _place(self, T_21: core.Pose, others: Sequence[core.Pose | None] = ()) -> _Placed:
-        """All matches by a motion, and the other views by what it places.
+        """Triangulate all matches by a motion, and estimate the other views' poses from the points.
 
-        Those views are sought from where they are taken to be, or on the way.
+        The search for a view starts at its assumed pose, or between the first view and the last.
         """
         view = self._view
         motion = core.place_points(
@@ -210,9 +209,9 @@ class MultiViewModelSelection:
         return _Placed(motion, points, is_placed, poses)
 
     def _adjusted(self, placed: _Placed) -> tuple[core.Pose, list[core.Pose | None]]:
-        """T_21 and the other views' poses after a bundle adjustment of all views.
+        """Return T_21 and the other views' poses after a bundle adjustment of all views.
 
-        With the points placed so far; the way between the first view and the last is of length 1.
+        It uses the points so far; the translation between first and last view has length 1.
         """
         unchanged = placed.motion.T_21, placed.poses[2:]
         rows = np.flatnonzero(placed.is_placed)
@@ -256,10 +255,10 @@ class MultiViewModelSelection:
         return T_21, [None if pose is None else next(left) for pose in placed.poses[2:]]
 
     def _cost(self, placed: _Placed) -> float:
-        """Mean squared error over everything seen, in units of its variance, at most 5.99 each.
+        """Return the mean squared error over all observations, in variances, at most 5.99 each.
 
-        What the two views place nowhere counts as wrong, or few points could fit well. What has so
-        little parallax that it would lie behind the first view is taken to be infinitely far.
+        Matches without a point count as wrong; otherwise a motion with few points could fit well. A
+        point with so little parallax that it would lie behind the first view is placed at infinity.
         """
         points = placed.points
         first = self._sightings[0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What other views say of a motion that was found between two."""
+"""Third views: test a motion between two views by other views."""
 
 from __future__ import annotations
 
@@ -34,8 +34,7 @@ class Candidate:
     view
         The first view.
     motions
-        What may have happened between the two: one motion, or those that two views cannot tell
-        apart.
+        Possible motions between the two: one, or those that two views cannot distinguish.
     """
 
     view: View
@@ -43,19 +42,19 @@ class Candidate:
 
     @staticmethod
     def of(view: View, result: core.TwoViewResult) -> Candidate | None:
-        """What two views gave; None if they gave no motion."""
+        """Return the motions of two views; None if there are none."""
         if result.success:
             return Candidate(view, (result,))
         return Candidate(view, tuple(result.alternatives)) if result.alternatives else None
 
     @property
     def is_clear(self) -> bool:
-        """Whether two views are enough to tell the motion."""
+        """Return whether two views alone determine the motion."""
         return len(self.motions) == 1
 
     @property
     def worth(self) -> float:
-        """Points times parallax [degrees]: more of either fixes the geometry better."""
+        """Points times parallax [degrees]: a larger product determines the geometry better."""
         return max(
             float(np.count_nonzero(placed_matches(self.view, motion) >= 0))
             * min(motion.parallax, _MOST_PARALLAX)
@@ -64,7 +63,7 @@ class Candidate:
 
 
 def reconstruct(view: View, last: core.Frame, seed: int) -> core.TwoViewResult:
-    """The motion from a view to the last frame, by the matches between the two alone."""
+    """Return the motion from a view to the last frame, by their matches alone."""
     return core.reconstruct_two_views(
         view.keypoints,
         last.keypoints,
@@ -77,20 +76,20 @@ def reconstruct(view: View, last: core.Frame, seed: int) -> core.TwoViewResult:
 
 
 def placed_matches(view: View, motion: Motion) -> Indices:
-    """Per keypoint of a view the index in the last frame, -1 where no point was placed."""
+    """Return per keypoint of a view its index in the last frame, -1 if it has no point."""
     return np.where(motion.triangulated != 0, view.matches, -1).astype(np.int32)
 
 
 @dataclass(frozen=True)
 class ThirdView:
-    """A view beside a candidate's.
+    """A further view, beside the candidate's.
 
     Attributes
     ----------
     view
         The view.
     partners
-        Per keypoint of the candidate's view its keypoint, -1 for none.
+        Per keypoint of the candidate's view the matching keypoint, -1 for none.
     """
 
     view: View
@@ -99,14 +98,14 @@ class ThirdView:
 
 @dataclass(frozen=True)
 class ThirdViews:
-    """Views that say something of a candidate's motions.
+    """Views that can test a candidate's motions.
 
     Attributes
     ----------
     views
         The views.
     fewest_common
-        So many of the candidate's points one of them must see.
+        Number of the candidate's points that each of them must see.
     """
 
     views: tuple[ThirdView, ...]
@@ -114,10 +113,10 @@ class ThirdViews:
 
     @staticmethod
     def of(candidate: Candidate, kept: InitialViews, limits: InitializationConfig) -> ThirdViews:
-        """Those that show most of what the last frame shows; or, if none does, what is left.
+        """Return the views that show most of the last frame; if there are none, the remaining ones.
 
-        A car that has few images a second sees little of a thing in three of them: then views count
-        that could not begin a map, and what was matched while one of the two was the last frame.
+        With few images a second, three images share few points. Then views that could not begin a
+        map are used too, with the matches stored when one of the two was the last frame.
         """
         view = candidate.view
         others = [third for third in kept.views if third is not view]
@@ -135,7 +134,7 @@ class ThirdViews:
         return ThirdViews(afar, round(_FEWER * limits.third_view_points))
 
     def asks(self, candidate: Candidate, third: ThirdView) -> bool:
-        """Whether a view sees enough of what each of the motions has placed."""
+        """Return whether a view sees enough of the points of each motion."""
         seen = third.partners >= 0
         return all(
             np.count_nonzero(seen & (placed_matches(candidate.view, motion) >= 0))
@@ -145,13 +144,13 @@ class ThirdViews:
 
 
 def _moved(third: View, view: View, limits: InitializationConfig) -> bool:
-    """Whether a view has moved enough from another and from the last frame to say something."""
+    """Return whether a view is far enough from another one and from the last frame."""
     between = min(third.displacement, abs(view.displacement - third.displacement))
     return between >= limits.third_view_share * view.displacement
 
 
 def _lies_between(third: ThirdView, view: View, limits: InitializationConfig) -> bool:
-    """The same of what all three see: what lies far away, which is seen for long, moves less."""
+    """Return the same for the points of all three views, which are distant and move less."""
     common = np.flatnonzero((view.matches >= 0) & (third.partners >= 0))
     if not len(common):
         return False
@@ -168,10 +167,10 @@ def _median_distance(here: Pixels, there: Pixels) -> float:
 def three_view_consistency(
     candidate: Candidate, thirds: ThirdViews, last: core.Frame, limits: InitializationConfig
 ) -> tuple[Motion, ...]:
-    """The motion that most of the other views agree with, and those that fit them nearly as well.
+    """Return the motion that most other views support, and those that fit nearly as well.
 
-    None of the motions is left if the other views do not agree, or cannot say. Where more than one
-    is left, the best fits them, but not much better than those that lead elsewhere.
+    Return no motion if the other views do not agree or cannot decide. If several motions remain,
+    the best one fits only slightly better than those in other directions.
     """
     asked = np.array(
         [
@@ -200,19 +199,20 @@ def three_view_consistency(
 
 
 def is_another_direction(motion: Motion, other: Motion, degrees: float) -> bool:
-    """Whether two motions lead more than so many degrees apart.
+    """Return whether the directions of two motions differ by more than these degrees.
 
-    Straight on to a wall its two motions are nearly one, and noise alone tells them apart.
+    In a motion straight towards a wall, both solutions are nearly equal, and only noise separates
+    them.
     """
     cosine = float(motion.T_21.translation @ other.T_21.translation)  # both of length 1
     return cosine < math.cos(math.radians(degrees))
 
 
 def _verdicts(candidate: Candidate, third: ThirdView, last: core.Frame) -> FloatArray:
-    """How well a third view fits to each motion, (motions, 2).
+    """Return how well a third view fits each motion, (motions, 2).
 
-    The share of the common points that it sees where they should be, and their mean squared
-    distance from there in units of its variance, at most 5.99 each.
+    First the share of common points seen at the predicted pixels, then their mean squared distance
+    from there, in variances, at most 5.99 each.
     """
     view, partners = third.view, third.partners
     verdicts = []
@@ -232,7 +232,7 @@ def _verdicts(candidate: Candidate, third: ThirdView, last: core.Frame) -> Float
 
 
 def on_the_way(T_21: core.Pose) -> list[core.Pose]:
-    """Where a view may have been while the camera went from the first one to the last."""
+    """Return possible poses of a view between the first view and the last."""
     return [core.Pose.exp(share * T_21.log()) for share in (0.5, 0.0, 1.0)]
 
 
@@ -243,16 +243,16 @@ def pose_of_view(
     inverse_sigma2: npt.NDArray[np.floating],
     camera: core.Camera,
 ) -> tuple[core.Pose, FloatArray]:
-    """Pose of a view that sees points, and their squared errors (n,) in units of the variance.
+    """Return the pose of a view that sees points, and their squared errors (n,) in variances.
 
     Parameters
     ----------
     starts
-        Where the estimate begins; what fits best is taken.
+        Initial poses of the estimation; the best result is used.
     points
         (n, 3), in the frame of the first view.
     keypoints
-        Where the view sees them, (n, 2) pixels.
+        Pixels of the points in the view, (n, 2).
     inverse_sigma2
         (n,) [px^-2].
     camera
@@ -277,7 +277,7 @@ def squared_errors(
     inverse_sigma2: npt.NDArray[np.floating],
     camera: core.Camera,
 ) -> FloatArray:
-    """Squared distances (n,) of points (n, 3) from where they are seen, over the variance.
+    """Return squared distances (n,) of points (n, 3) from their pixels, over the variance.
 
     Infinite where the camera cannot see a point.
     """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Map merging: two maps that show the same place become one.
+"""Map merging: join two maps that show the same place.
 
 Campos et al., "ORB-SLAM3", IEEE T-RO 2021, section VI, and Elvira et al., "ORBSLAM-Atlas", IROS
-2019, with the care of loop closing and more: no drift limits how far two maps may be apart. Step by
-step: ``docs/method/several_maps.md``.
+2019. The checks are stricter than those of loop closing, because no drift limits the distance
+between two maps. Step by step: ``docs/method/several_maps.md``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Lease = Callable[[int], AbstractContextManager[bool]]
 
 
 class MapMerging:
-    """Decides whether two maps show the same place, and makes them one.
+    """Decides whether two maps show the same place, and merges them.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ class MapMerging:
     find_alike : callable
         Keyframes that look like one and share no point with it.
     lease : callable
-        Keeps a keyframe alive that mapping might cull.
+        Protects a keyframe from culling.
     fix_scale : bool
-        Depth is measured: the maps have one scale.
+        Depth is measured: both maps have the same scale.
     config : MergingConfig
         Limits.
     """
@@ -74,21 +74,21 @@ class MapMerging:
         self._shown: dict[int, tuple[int, FloatArray]] = {}
 
     def reset(self) -> None:
-        """Forget what keyframes showed: the maps are others."""
+        """Drop the stored places of keyframes: the maps have changed."""
         self._shown.clear()
 
     # ---- is it the same place? -------------------------------------------------------------------
     def choose(
         self, consistent: Sequence[core.Loop], others: Callable[[], Sequence[core.Loop]]
     ) -> core.Loop | None:
-        """Choose the place in another map that a keyframe shows, if nothing speaks against it.
+        """Choose the place in another map that a keyframe shows, if all checks pass.
 
         Parameters
         ----------
         consistent : sequence of Loop
-            Verified places in other maps, that the keyframes before proposed as well.
+            Verified places in other maps that the keyframes before also proposed.
         others : callable
-            Gives all other verified places, in any map, that look like it.
+            Gives all other verified places in any map that look like it.
         """
         if not consistent:
             return None
@@ -113,7 +113,7 @@ class MapMerging:
         return True
 
     def _is_alone(self, best: core.Loop, others: Sequence[core.Loop]) -> bool:
-        """Whether no other place looks like both ends."""
+        """Return whether no other place looks like either end."""
         here = self._map.map_of(best.current)
         elsewhere = [loop for loop in others if self._map.map_of(loop.matched) != here]
         if core.choose_merge(self._map, [best, *elsewhere], self._fix_scale) is None:
@@ -128,7 +128,7 @@ class MapMerging:
         return all(loop is None or self._is_drift(loop) for loop in found)
 
     def _is_drift(self, loop: core.Loop) -> bool:
-        """Whether two places of one map may be one, that drift has torn apart."""
+        """Return whether two places of one map may be the same place, separated by drift."""
         return bool(core.assess_drift(self._map, loop, self._fix_scale).plausible())
 
     def _remember(self, best: core.Loop) -> None:
@@ -137,7 +137,7 @@ class MapMerging:
             del self._shown[next(iter(self._shown))]
 
     def _is_confirmed(self, best: core.Loop) -> bool:
-        """Whether keyframes around see the other map from where they should be."""
+        """Return whether neighbouring keyframes see the other map from the expected poses."""
         limits = self._limits
         slam_map = self._map
         scene_depth = core.median_scene_depth(slam_map, best.matched)
@@ -160,18 +160,19 @@ class MapMerging:
         return False
 
     def _is_explained(self, best: core.Loop) -> bool:
-        """Whether enough is found of what should be seen if it is that place.
+        """Return whether enough of the expected points are found.
 
-        Where a wall repeats, the view fits a few metres on as well; what lies behind it does not.
+        At a repetitive wall, the view also fits some metres further on; the points behind the wall
+        do not.
         """
         share = explained_share(self._map, best, self._limits.view_cosine)
         return share >= self._limits.explained
 
     def _place_of(self, keyframe: int, candidates: list[int], far: int) -> FloatArray | None:
-        """S_cw (4, 4) of a keyframe in the map of `far`, by one of the candidates there.
+        """Return S_cw (4, 4) of a keyframe in the map of `far`, by one of the candidates there.
 
-        Else by what it showed when it came: of keyframes that stand far apart each may show
-        another part of that map.
+        Otherwise use its place stored earlier: distant keyframes may show different parts of that
+        map.
         """
         for candidate in candidates:
             loop = self._verify(keyframe, candidate)
@@ -200,16 +201,16 @@ class MapMerging:
     def join(
         self, loop: core.Loop, timer: StageTimer, cancelled: core.StopFlag
     ) -> MapsMerged | None:
-        """Make one map of two; local mapping stands still meanwhile.
+        """Merge two maps; local mapping is paused meanwhile.
 
         Parameters
         ----------
         loop : Loop
             What `choose` gave.
         timer : StageTimer
-            Takes the time of each step.
+            Measures the time of each step.
         cancelled : StopFlag
-            Ends the adjustments early; the maps are joined all the same once that has begun.
+            Ends the adjustments early; once the merge has begun, the maps are still joined.
         """
         self._map.update_connections(loop.current)
         with timer("plan"):
@@ -249,7 +250,7 @@ class MapMerging:
     def _weld(
         self, current: int, map_index: int, timer: StageTimer, cancelled: core.StopFlag
     ) -> None:
-        """Adjust both neighbourhoods together, and let the rest of the map follow."""
+        """Adjust both neighbourhoods together, and move the rest of the map with them."""
         slam_map = self._map
         before = core.poses_of_map(slam_map, map_index)
         seam = core.keyframes_of_seam(slam_map, current)
@@ -267,23 +268,23 @@ def _parts(S_cw: FloatArray) -> tuple[float, FloatArray, FloatArray]:
 
 
 def explained_share(slam_map: core.Map, loop: core.Loop, view_cosine: float) -> float:
-    """The share of points that a keyframe should see at a place in another map, and sees.
+    """Return the share of expected points that a keyframe sees at a place in another map.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The maps.
     loop : Loop
-        The place, with the points around it and how many of them the keyframe shows.
+        The place, its surrounding points, and how many of them the keyframe sees.
     view_cosine : float
-        Points are counted that are seen from nearly where they were seen before: cosine of the
-        angle between both directions, at least.
+        Count only points seen from nearly the same direction as before: least cosine of the angle
+        between both directions.
 
     Returns
     -------
     float
-        Matches over points that are in the image of the keyframe, within the distances at which
-        they can be recognised, and seen from the right side; 0 if there are none.
+        Matches over points in the image of the keyframe, in the range of distances at which they
+        can be matched, seen from the front; 0 if there are none.
     """
     try:
         features = slam_map.keyframe_frame(loop.current)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ways to a frame's pose, and in which order they are tried; ``docs/method/tracking.md``."""
+"""Methods that estimate a frame's pose, and their order; ``docs/method/tracking.md``."""
 
 from orbslam2py.slam.pose_search.first_estimate import (
     estimate_in_fixed_map,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a frame's first pose comes from, while the map grows and while it stays as it is.
+"""The first estimate of a frame's pose, in a growing map and in a fixed one.
 
 Mur-Artal, Montiel and Tardos, "ORB-SLAM: a Versatile and Accurate Monocular SLAM System", 2015,
 sections V-B and V-C; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-F.
@@ -19,7 +19,7 @@ from orbslam2py.slam.state import State
 def estimate_in_growing_map(
     search: PoseSearch, frame: core.TrackedFrame, state: State
 ) -> tuple[PoseEstimate, State]:
-    """By the motion model, else the reference keyframe; when lost, anywhere in the map.
+    """Use the motion model, then the reference keyframe; if lost, relocalization.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def estimate_in_growing_map(
     PoseEstimate
         Found or not.
     State
-        The state as it follows the map, and as relocalization leaves it.
+        The state after it follows the map, and after relocalization.
     """
     relocalized = PoseEstimate()
     if state.is_lost:
@@ -66,9 +66,9 @@ def estimate_in_growing_map(
 def estimate_in_fixed_map(
     search: PoseSearch, frame: core.TrackedFrame, state: State
 ) -> tuple[PoseEstimate, State]:
-    """By the motion model or the reference keyframe, also where the map ends.
+    """Use the motion model or the reference keyframe, also outside the map.
 
-    There the pose depends on the depths of the last frame (visual odometry), while every frame is
+    Outside, the pose depends on the depths of the last frame (visual odometry), and every frame is
     also searched in the map. Parameters and results are those of `estimate_in_growing_map`.
     """
     if state.is_lost:
@@ -96,7 +96,7 @@ def _by_motion_model(search: PoseSearch, frame: core.TrackedFrame, state: State)
 def _back_into_the_map(
     search: PoseSearch, frame: core.TrackedFrame, state: State
 ) -> tuple[PoseEstimate, State]:
-    """Go on with visual odometry, unless the map is in view again."""
+    """Continue visual odometry, unless the frame is found in the map."""
     odometry = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
     if state.motion.velocity is not None:
         odometry = _by_motion_model(search, frame, state)

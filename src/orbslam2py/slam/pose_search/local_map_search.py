@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses refined with the points of the map around them.
+"""Refinement of poses by the points of the local map.
 
 Mur-Artal, Montiel and Tardos, 2015, section V-D; ``docs/method/tracking.md#local-map``.
 """
@@ -25,41 +25,41 @@ _ELSEWHERE = 3.0  # standard deviations: 99 % of two poses of one camera are nea
 
 @dataclass(frozen=True)
 class RefinedPose:
-    """A pose with all that was found of the map around it."""
+    """A refined pose with its matches in the local map."""
 
     frame: core.TrackedFrame
     """Holds pose and associations."""
     estimate: PoseEstimate
     local_map: core.LocalMap | None
-    """Where it was searched; None where the pose is settled by visual odometry alone."""
+    """The local map; None if the pose is from visual odometry alone."""
     visible: IntArray
-    """Ids of the points in view that the first estimate did not hold."""
+    """Ids of the points in view without a match in the first estimate."""
     n_predicted: int
     """Points that should be in view."""
 
     @cached_property
     def position_deviation(self) -> float:
-        """Standard deviation of the position, all directions together [m]; 0 if not known."""
+        """Return the standard deviation of the position over all directions [m]; 0 if not known."""
         covariance = self.estimate.covariance
         return 0.0 if covariance is None else core.position_deviation(covariance)
 
     @cached_property
     def spread(self) -> core.InlierSpread:
-        """How the inliers are spread over image and depth, and how far they are wrong together."""
+        """Return how the inliers are distributed over image and depth, and their common errors."""
         return core.spread_of_inliers(self.frame)
 
 
 class LocalMapSearch:
-    """Matches frames with the points around them, as far around as there is reason to.
+    """Matches frames with the points of the local map, in a window that depends on the state.
 
-    Nothing is remembered of a frame: there may be several ways to its pose.
+    It stores nothing about a frame, because several hypotheses may be refined.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     sensor : Sensor
-        What the images come from.
+        The sensor.
     config : TrackingConfig
         Limits.
     aligned_inliers : int
@@ -80,12 +80,12 @@ class LocalMapSearch:
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
     def refine(self, frame: core.TrackedFrame, first: PoseEstimate, state: State) -> RefinedPose:
-        """Refine a first estimate with all points around it, and see how many are found.
+        """Refine a first estimate with all points of the local map, and count the matches.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            With the pose and the associations of the first estimate.
+            It has the pose and the associations of the first estimate.
         first : PoseEstimate
             The first estimate.
         state : State
@@ -94,7 +94,7 @@ class LocalMapSearch:
         Returns
         -------
         RefinedPose
-            Whether it was found says its estimate.
+            Its estimate says whether the frame was found.
         """
         if first.visual_odometry:
             return _beyond_the_map(frame, first, state)
@@ -123,25 +123,23 @@ class LocalMapSearch:
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
     def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
-        """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
+        """Match a frame with the map again, without its associations.
 
-        What is matched with the frame before stays matched from frame to frame, and holds a pose
-        where it was. In a map that does not change, an image is to be in one place, whatever was
-        seen before it.
+        Matches are inherited from frame to frame, which biases the pose towards its predecessor. In
+        a fixed map, the pose of an image must not depend on the images before it.
 
         Parameters
         ----------
         refined : RefinedPose
             Where the search begins. It is not changed.
         in_doubt : bool
-            Whether few points held the pose, or wrong ones: then it is taken from wherever the
-            search leads.
+            Whether the pose had few or wrong matches: then any result of the search is accepted.
 
         Returns
         -------
         RefinedPose
-            That of another version of the frame, if it lies clearly elsewhere or, in doubt,
-            wherever it lies; the one that was given if too little of it is found.
+            The pose of the new search if it clearly differs, or in doubt always; the given pose if
+            the search finds too little.
         """
         limits, local_map = self._limits, refined.local_map
         n_of_map = refined.frame.n_map_inliers()
@@ -181,7 +179,7 @@ class LocalMapSearch:
         first: PoseEstimate,
         optimized: core.PoseEstimate,
     ) -> PoseEstimate:
-        """What a pose is by what was found of the local map."""
+        """Return the pose with its matches in the local map."""
         estimate = PoseEstimate(
             n_matches=frame.n_associated(),
             n_inliers=optimized.n_inliers,
@@ -214,14 +212,14 @@ def _fused(
 
 
 def _beyond_the_map(frame: core.TrackedFrame, odometry: PoseEstimate, state: State) -> RefinedPose:
-    """Take a pose from the depths of the last frame; these points should be in view."""
+    """Use a pose from the depths of the last frame; these points should be in view."""
     assert frame.T_cw is not None
     n_predicted = core.count_staying(state.motion.last, frame.T_cw)
     return RefinedPose(frame, odometry, None, np.zeros(0, np.int64), n_predicted)
 
 
 def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose) -> bool:
-    """Whether another version of a frame lies several deviations from a refined pose."""
+    """Return whether another pose of a frame is several standard deviations from a refined pose."""
     T_cw = refined.frame.T_cw
     assert T_cw is not None and frame.T_cw is not None
     _, move = frame.T_cw.difference(T_cw)

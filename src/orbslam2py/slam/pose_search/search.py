@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The ways to a frame's pose: each takes a frame and returns one estimate.
+"""Methods that estimate a frame's pose: each takes a frame and returns one estimate.
 
 Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking.md``.
 """
@@ -20,7 +20,7 @@ _WIDEST = 60.0  # half width of the search window around the prediction of an IM
 
 
 class PoseSearch:
-    """Finds a frame's pose from the last frame, a keyframe, the whole map or the local map.
+    """Estimates a frame's pose by the last frame, a keyframe, the whole map or the local map.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class PoseSearch:
     vocabulary : orbslam2py._core.Vocabulary
         Visual words for matching with keyframes.
     sensor : Sensor
-        What the images come from.
+        The sensor.
     relocalizer : Relocalizer, optional
-        Finds lost frames in the map; without it none is found there.
+        Finds lost frames in the map; None: no relocalization.
     config : TrackingConfig
         Limits.
     pixels_per_radian : float
@@ -46,7 +46,7 @@ class PoseSearch:
     limits : TrackingConfig
         Thresholds.
     local_map_search : LocalMapSearch
-        Refines poses with the points around them.
+        Refines poses with the points of the local map.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class PoseSearch:
     def by_motion_model(
         self, frame: core.TrackedFrame, state: State, *, beyond_the_map: bool = False
     ) -> PoseEstimate:
-        """From the points that the last frame saw, searched where its speed puts them.
+        """Use the points of the last frame, searched around their predicted pixels.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class PoseSearch:
         state : State
             The state before it.
         beyond_the_map : bool
-            Also from depths that the last frame measured and the map does not hold.
+            Use depths measured in the last frame too, which are no map points.
         """
         motion = state.motion
         motion.predict(frame)
@@ -101,7 +101,7 @@ class PoseSearch:
     def around_prediction(
         self, frame: core.TrackedFrame, motion: Motion, narrow: float
     ) -> PoseEstimate:
-        """From the points that the last frame saw, searched where the frame's pose puts them.
+        """Use the points of the last frame, searched around their pixels by the frame's pose.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class PoseSearch:
     def by_keyframes(
         self, frame: core.TrackedFrame, state: State, n_neighbours: int = 0
     ) -> PoseEstimate:
-        """From a keyframe's points, matched by words, beginning at the last pose.
+        """Use a keyframe's points, matched by words; start at the last pose.
 
         Parameters
         ----------
@@ -135,8 +135,8 @@ class PoseSearch:
         state : State
             The state before it.
         n_neighbours : int
-            So many covisible keyframes of the reference keyframe are tried as well, and the one
-            with most matches is taken.
+            Number of covisible keyframes of the reference keyframe that are also tried; the one
+            with most matches is used.
         """
         state.motion.stand_still(frame)
         core.describe(frame.features, self._vocabulary)
@@ -177,10 +177,10 @@ class PoseSearch:
         )
 
     def by_all_keypoints(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
-        """From the reference keyframe's points, each compared with every keypoint of the frame.
+        """Use the reference keyframe's points; compare each with every keypoint of the frame.
 
-        Finds the way from one frame to the next where nothing is known of it, and what was seen
-        looks different by now: in the second frame of a map that begins in a fast car.
+        This works without a prediction and after large changes of the image: in the second frame of
+        a map that begins in a fast car.
         """
         failed = PoseEstimate(Reason.FEW_MATCHES_REFERENCE)
         if self._relocalizer is None or state.reference_keyframe < 0:
@@ -196,7 +196,7 @@ class PoseSearch:
     def by_relocalization(
         self, frame: core.TrackedFrame, state: State
     ) -> tuple[PoseEstimate, State]:
-        """From the user's guess, if any; else from any keyframe that looks like the frame."""
+        """Use the user's guess, if any; else any keyframe that looks like the frame."""
         not_found = Reason.NOT_FOUND_IN_MAP
         if state.in_loaded_map and state.motion.last_frame is None:
             not_found = Reason.SEARCHING_LOADED_MAP
@@ -224,7 +224,7 @@ class PoseSearch:
         return estimate, state
 
     def _some_keyframe_around(self, frame: core.TrackedFrame, reference_keyframe: int) -> int:
-        """Any keyframe of the map that the frame was found in, until its local map is searched."""
+        """Return any keyframe of the frame's map, for use before the local map is searched."""
         slam_map = self.map
         ids = frame.map_points
         found_in = slam_map.active_map
@@ -249,7 +249,7 @@ class PoseSearch:
         return estimate if enough else estimate.failed(too_few)
 
     def settle(self, refined: RefinedPose, state: State, *, fixed_map: bool) -> State:
-        """Take a refined pose, found or not, as that of its frame.
+        """Store a refined pose, found or not, in its frame.
 
         Parameters
         ----------
@@ -258,7 +258,7 @@ class PoseSearch:
         state : State
             The state before it.
         fixed_map : bool
-            Localization mode: the map does not count what is seen of it.
+            Localization mode: the map does not count these observations.
         """
         if refined.local_map is None:
             refined.frame.discard_outliers()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a lost camera is searched."""
+"""Search of a lost camera in the map."""
 
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.relocalizer import Relocalization, Relocalizer

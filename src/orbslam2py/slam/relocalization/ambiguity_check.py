@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a frame that was found would fit at another place as well.
+"""Check whether a relocalized frame would also fit at another place.
 
 ``docs/method/relocalization.md``, "Another place that fits".
 """
@@ -22,26 +22,26 @@ _log = logging.getLogger(__name__)
 
 
 class _Place(NamedTuple):
-    """A keyframe's place where a frame was found."""
+    """The place of a keyframe at which a frame was found."""
 
     keyframe: int
     version: core.TrackedFrame
-    """Of the frame, with its pose there."""
+    """The frame, with its pose at this place."""
 
 
 class AmbiguityCheck:
-    """Chooses among all places of one map that a frame fits.
+    """Chooses among the places of one map that a frame fits.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     places : CandidatePlaces
-        Knows which keyframes look alike.
+        Gives keyframes that look alike.
     fitting : PnPVerification
         Fits frames to keyframes.
     fix_scale : bool
-        Depth is measured: the map has one scale, which does not drift.
+        Depth is measured: the map has one scale without drift.
     config : RelocalizationConfig
         Limits.
     """
@@ -73,13 +73,13 @@ class AmbiguityCheck:
         keyframe : int
             Where.
         candidates : sequence of Candidate
-            All keyframes that it was compared with.
+            All keyframes that the frame was compared with.
 
         Returns
         -------
         orbslam2py._core.TrackedFrame or None
-            `frame` itself if it fits nowhere else, or far better there; a version of it at another
-            place, if it fits far better there; None if nobody can say.
+            `frame` itself if it fits nowhere else, or far better there; a copy of it at another
+            place, if it fits far better there; None if the place is ambiguous.
         """
         there = _Place(keyframe, frame)
         rivals = self._rivals(there, candidates)
@@ -92,9 +92,9 @@ class AmbiguityCheck:
         return best.version
 
     def _rivals(self, there: _Place, candidates: Sequence[Candidate]) -> list[_Place]:
-        """Where else in the same map a frame fits: places that drift cannot make one with its own.
+        """Return other places of the same map that the frame fits, and that drift cannot explain.
 
-        How other maps lie to this one is not known.
+        The relative pose of other maps is not known.
         """
         slam_map = self._map
         asked = {candidate.keyframe for candidate in candidates}
@@ -114,7 +114,7 @@ class AmbiguityCheck:
         return rivals
 
     def _best_supported(self, places: list[_Place]) -> _Place | None:
-        """The place whose surroundings the frame shows by far best, if there is one."""
+        """Return the place whose points the frame shows by far best, if there is one."""
         supports = [self._support(place.version) for place in places]
         best = int(np.argmax(supports))
         most = self._limits.rival_share * supports[best]
@@ -130,7 +130,7 @@ class AmbiguityCheck:
         )
 
     def _support(self, version: core.TrackedFrame) -> int:
-        """How many points of the local map a frame finds from its pose."""
+        """Return how many points of the local map a frame finds from its pose."""
         seen = core.TrackedFrame(version.features)
         seen.take_over(version)
         local_map = core.select_local_map(self._map, seen)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which keyframes a lost frame is compared with: a bounded number, other ones at each failure."""
+"""The keyframes that a lost frame is compared with: a limited number, varied after each failure."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _NEAR_CANDIDATES = 4  # near the last known pose, that are matched with one fram
 
 
 class CandidatePlaces:
-    """Keyframes that may show what a lost frame shows.
+    """Keyframes that may show the place of a lost frame.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     keyframe_index : orbslam2py._core.KeyFrameIndex
-        Which keyframes contain which words.
+        Index from words to keyframes.
     """
 
     def __init__(self, slam_map: core.Map, keyframe_index: core.KeyFrameIndex) -> None:
@@ -30,19 +30,19 @@ class CandidatePlaces:
         self._keyframe_index = keyframe_index
 
     def of(self, frame: core.Frame, lost: LostSearch) -> tuple[list[int], LostSearch]:
-        """Choose keyframes for a described frame.
+        """Choose keyframes for a frame with words.
 
         Parameters
         ----------
         frame : orbslam2py._core.Frame
             With its words.
         lost : LostSearch
-            Where tracking was lost, and what was searched since.
+            Where tracking was lost, and the searches since then.
 
         Returns
         -------
         list of int
-            Ids, the most likely first, each once.
+            Ids, the most likely first, without repetition.
         LostSearch
             For the next frame.
         """
@@ -56,9 +56,9 @@ class CandidatePlaces:
         return list(dict.fromkeys(by_words + by_place)), lost
 
     def alike(self, keyframe: int) -> list[int]:
-        """Keyframes that look like one of the map and share no point with it.
+        """Return keyframes that look like a keyframe of the map and share no point with it.
 
-        Ids, the likeliest first, no more than are compared with a frame.
+        Ids, the most likely first, at most as many as for a frame.
         """
         found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, 0.0)
         ranked = sorted(found, key=lambda place: (-place.group_score, place.keyframe))
@@ -71,9 +71,10 @@ class CandidatePlaces:
         return replace(lost, recent_scores=recent)
 
     def _by_words(self, lost: LostSearch) -> list[int]:
-        """Keyframes that look like one of the last frames; the most likely first.
+        """Return keyframes that look like one of the last frames; the most likely first.
 
-        A lost camera moves on like any other, so scores of several frames tell more than one.
+        A lost camera moves continuously, so the scores of several frames are more reliable than
+        one.
         """
         scores: dict[int, float] = {}
         for recent in lost.recent_scores:
@@ -83,10 +84,10 @@ class CandidatePlaces:
         return sorted(living, key=lambda keyframe: (-scores[keyframe], keyframe))
 
     def _around(self, places: list[int]) -> list[int]:
-        """Other keyframes of these places, those first that share most with the one named.
+        """Return other keyframes of these places, first those with most common points.
 
-        A place is named by the keyframe whose words are most alike; the camera may be much nearer
-        to another one.
+        The index gives the keyframe with the most similar words; the camera may be much nearer to
+        another one.
         """
         n = COVISIBLE_KEYFRAMES
         neighbours = [self._map.best_neighbours(keyframe, n).tolist() for keyframe in places]
@@ -96,7 +97,7 @@ class CandidatePlaces:
 
 
 def _taken(ranked: list[int], most: int, failures: int) -> list[int]:
-    """The first half of `most` always, the other half further down at every failure."""
+    """Return the best half of `most`, and a half that moves on after each failure."""
     if len(ranked) <= most:
         return ranked
     always = most - most // 2

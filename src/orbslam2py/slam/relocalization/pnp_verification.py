@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A lost frame's pose at one of several keyframes: matches by words, RANSAC, more matches.
+"""Pose of a lost frame by one of several keyframes: matches by words, RANSAC, more matches.
 
 Mur-Artal and Tardos, "Fast Relocalisation and Loop Closing in Keyframe-Based SLAM", ICRA 2014;
 ``docs/method/relocalization.md``.
@@ -18,14 +18,14 @@ _VERIFIED_POSES = 20  # most RANSAC poses that are optimised for one frame: boun
 
 
 def optimize(frame: core.TrackedFrame) -> int:
-    """Optimise a pose and drop the outliers; the number of inliers."""
+    """Optimise a pose and drop the outliers; return the number of inliers."""
     estimate = core.optimize_pose(frame)
     frame.discard_outliers()
     return estimate.n_inliers
 
 
 class Candidate:
-    """A keyframe that looks like the frame: its matches and the RANSAC over them."""
+    """A keyframe that looks like the frame, with its matches and its RANSAC."""
 
     def __init__(self, keyframe: int, matches: core.TrackedFrame, seed: int) -> None:
         self.keyframe = keyframe
@@ -62,16 +62,16 @@ class PnPVerification:
     def matched(
         self, frame: core.TrackedFrame, keyframes: list[int], *, thoroughly: bool = False
     ) -> list[Candidate]:
-        """Those of some keyframes that share enough words with a frame.
+        """Return those keyframes that have enough matches by words with a frame.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            Described, unless it is matched thoroughly.
+            The frame, with words, unless `thorough` is set.
         keyframes : list of int
             Ids.
         thoroughly : bool
-            Without words: every point is compared with every keypoint, which takes longer.
+            Without words: compare every point with every keypoint, which takes longer.
         """
         limits = self._limits
         match, ratio, fewest = core.match_keyframe_by_words, limits.ratio, limits.matches
@@ -90,7 +90,7 @@ class PnPVerification:
     def first_that_fits(
         self, frame: core.TrackedFrame, candidates: list[Candidate], enough: int
     ) -> tuple[Candidate, int] | None:
-        """The candidate that gives the frame a pose, and its inliers."""
+        """Return the candidate that gives the frame a pose, and its inliers."""
         limits = self._limits
         n_verified = 0
         while candidates and n_verified < _VERIFIED_POSES:
@@ -108,7 +108,7 @@ class PnPVerification:
         return None
 
     def _verify(self, frame: core.TrackedFrame, candidate: Candidate, pose: core.PnpPose) -> int:
-        """Optimise the pose, add matches by projection; the number of inliers."""
+        """Optimise the pose, add matches by projection; return the number of inliers."""
         limits = self._limits
         keep = np.zeros(len(frame.features), bool)
         keep[candidate.indices[pose.inliers != 0]] = True

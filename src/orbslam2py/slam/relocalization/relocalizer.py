@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Relocalization: the pose of a frame in the map when the frame before has none.
+"""Relocalization: the pose of a frame in the map, without the frame before.
 
 Mur-Artal and Tardos, "Fast Relocalisation and Loop Closing in Keyframe-Based SLAM", ICRA 2014;
 ``docs/method/relocalization.md``.
@@ -27,27 +27,27 @@ _WIDENING, _WIDEST = 0.25, 3.0  # growth of its search radius at a failure, and 
 
 
 class Relocalization(NamedTuple):
-    """What came of the search for a lost frame."""
+    """The result of the search for a lost frame."""
 
     n_inliers: int = 0
     """0: not found."""
     is_ambiguous: bool = False
-    """Not found, because it fits at several places."""
+    """Not found, because it fits several places."""
 
 
 class Relocalizer:
-    """Finds a frame in the map, with work for one frame that does not grow with the map.
+    """Finds a frame in the map; the work for one frame does not grow with the map.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map.
     keyframe_index : orbslam2py._core.KeyFrameIndex
-        Which keyframes contain which words.
+        Index from words to keyframes.
     seed : int
         Seed of the draws.
     fix_scale : bool
-        Depth is measured: the map has one scale, which does not drift.
+        Depth is measured: the map has one scale without drift.
     config : RelocalizationConfig
         Limits.
     """
@@ -72,17 +72,17 @@ class Relocalizer:
     def relocalize(
         self, frame: core.TrackedFrame, lost: LostSearch
     ) -> tuple[Relocalization, LostSearch]:
-        """Find pose and associations of a described frame.
+        """Estimate pose and associations of a frame with words.
 
-        The place where tracking was lost is searched first, if it is known, then keyframes that
-        look like the frame.
+        Search near the last known pose first, if there is one, then at keyframes that look like the
+        frame.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             The frame. If it is not found, it has no associations.
         lost : LostSearch
-            What is known of the frames before.
+            What is known of earlier frames.
 
         Returns
         -------
@@ -140,10 +140,10 @@ class Relocalizer:
         return Relocalization(is_ambiguous=is_ambiguous), lost
 
     def relocalize_near(self, frame: core.TrackedFrame, T_cw: core.Pose) -> int:
-        """Find pose and associations of a frame near a guess, without words.
+        """Estimate pose and associations of a frame near a guess, without words.
 
-        The points of the nearest keyframes that look the same way are searched where the guess
-        puts them.
+        Search the points of the nearest keyframes with a similar viewing direction around their
+        pixels by the guess.
 
         Parameters
         ----------
@@ -162,10 +162,10 @@ class Relocalizer:
         return self._near(frame, T_cw, nearest, 1.0, self._limits.enough)
 
     def compare_with(self, frame: core.TrackedFrame, keyframes: list[int]) -> int:
-        """Find pose and associations of a frame by all keypoints of keyframes that it may show.
+        """Estimate pose and associations by comparing all keypoints with those of likely keyframes.
 
-        Neither words nor a guess are needed: points are matched by their descriptors alone, and
-        RANSAC tells which matches agree.
+        It needs no words and no guess: points are matched by their descriptors alone, and RANSAC
+        rejects wrong matches.
 
         Returns
         -------
@@ -217,7 +217,7 @@ class Relocalizer:
         return 0
 
     def _nearest(self, T_cw: core.Pose, ids: IntArray, T_wc: FloatArray) -> list[int]:
-        """The keyframes (k,) with poses (k, 4, 4) that are nearest and look the same way."""
+        """Return the nearest keyframes (k,) with similar directions, and poses (k, 4, 4)."""
         if not len(ids):
             return []
         guess = T_cw.inverse().matrix

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where and since when tracking is lost, and what a relocalized frame must be confirmed by.
+"""Where and since when tracking is lost, and the confirmation of a relocalized frame.
 
 ``docs/method/relocalization.md``, ``docs/method/several_maps.md#being-lost``.
 """
@@ -42,9 +42,9 @@ class LastKnownPose:
         return replace(self, velocity=velocity)
 
     def keyframes(self, slam_map: core.Map) -> list[int]:
-        """List the reference keyframe, its best covisible keyframes, and the last ones inserted.
+        """Return the reference keyframe, its best covisible keyframes, and the last ones inserted.
 
-        Each once, the most likely first.
+        The most likely first, without repetition.
         """
         reference = slam_map.living(self.reference_keyframe)
         if reference < 0:
@@ -55,7 +55,7 @@ class LastKnownPose:
         return list(dict.fromkeys([reference, *covisible.tolist(), *youngest.tolist()]))
 
     def guesses(self, frame: core.TrackedFrame) -> list[core.Pose]:
-        """Predict the pose ``T_cw`` of a later frame: by constant velocity, and at rest.
+        """Predict the pose ``T_cw`` of a later frame: by constant velocity, and without motion.
 
         Parameters
         ----------
@@ -75,28 +75,28 @@ class LostSearch:
     """What relocalization carries from one lost frame to the next."""
 
     place: LastKnownPose | None = None
-    """Where tracking was lost; None if it was not, or in another map."""
+    """Where tracking was lost; None if it is not lost, or was lost in another map."""
     failures: int = 0
-    """Frames that were searched in vain since."""
+    """Number of frames since then without a pose."""
     recent_scores: tuple[Mapping[int, float], ...] = ()
     """Keyframes that look like one of the last frames, with their scores; the oldest first."""
 
 
 @dataclass(frozen=True)
 class LostTime:
-    """Since when tracking is lost, by time stamps [s]."""
+    """Time since when tracking is lost, by time stamps [s]."""
 
     lost_since: float | None = None
     """None: tracking is not lost."""
     tracked_since: float | None = None
-    """First frame with a pose after that; a short success does not end the loss."""
+    """First frame with a pose after the loss; a few such frames do not end it."""
 
     def lost(self, timestamp: float) -> LostTime:
         """Count a frame without a pose."""
         return LostTime(timestamp if self.lost_since is None else self.lost_since)
 
     def tracked(self, timestamp: float, patience: float | None) -> LostTime:
-        """Count a frame with a pose; as many seconds as the patience of them end the loss."""
+        """Count a frame with a pose; the loss ends once such frames outlast the patience."""
         if self.lost_since is None:
             return self
         since = timestamp if self.tracked_since is None else self.tracked_since
@@ -104,7 +104,7 @@ class LostTime:
         return LostTime() if ended else replace(self, tracked_since=since)
 
     def is_over(self, timestamp: float, patience: float | None) -> bool:
-        """Whether tracking has been lost for longer than the patience."""
+        """Return whether tracking has been lost for longer than the patience."""
         if patience is None or self.lost_since is None:
             return False
         return timestamp - self.lost_since >= patience
@@ -129,7 +129,7 @@ class Unconfirmed:
         return cls(frame.T_cw, inlier_points(frame))
 
     def is_confirmed_by(self, frame: core.TrackedFrame, limits: RelocalizationConfig) -> bool:
-        """Whether the next frame sees the same points from nearly the same direction.
+        """Return whether the next frame sees the same points from nearly the same direction.
 
         Parameters
         ----------

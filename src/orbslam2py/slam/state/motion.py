@@ -26,7 +26,7 @@ def _no_points() -> core.PointBatch:
 
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """A velocity that is constant in the axes of the camera, as the motion over an interval."""
+    """A velocity, constant in the axes of the camera: the motion over an interval."""
 
     step: core.Pose
     """Motion over the interval, ``T_cl``."""
@@ -53,11 +53,11 @@ class Motion:
     """The last frame with a pose, and the motion since the frame before it."""
 
     last_frame: core.TrackedFrame | None = None
-    """The last frame with a pose. It stays while the camera is lost."""
+    """The last frame with a pose. It is kept while the camera is lost."""
     velocity: Velocity | None = None
     """Velocity at the last frame; None where it is not known."""
     last_points: core.PointBatch = field(default_factory=_no_points)
-    """Copies of the points that the last frame saw, as of the last `following`."""
+    """Copies of the points of the last frame, made by the last `following`."""
     is_tracked: bool = False
     """The next frame follows the last one: the camera was not lost in between."""
     prediction_covariance: FloatArray | None = None
@@ -125,7 +125,7 @@ class Motion:
         frame : orbslam2py._core.TrackedFrame
             The frame.
         quaternion_xyzw : array of float64, (4,)
-            Rotates directions from the last camera to the frame's.
+            Rotation of directions from the last camera to the frame's camera.
         """
         T_lw = self.last.T_cw
         assert T_lw is not None
@@ -189,7 +189,7 @@ class Motion:
         return replace(self, last_points=points, velocity=velocity, map_motion=moved)
 
     def after(self, frame: core.TrackedFrame) -> Motion:
-        """Measure the velocity, if the frame follows the last one, and make it the last one."""
+        """Measure the velocity, if the frame is consecutive, and make it the last one."""
         last, velocity = self.last_frame, None
         if last is not None and self.is_tracked:
             follows = frame.id == last.id + 1 and frame.big_change == last.big_change

@@ -18,14 +18,14 @@ _ERROR_SPREADS = 3.0  # mean deviations above the mean from which an error may b
 
 @dataclass(frozen=True)
 class PoseStatistics:
-    """Inliers of a pose, share of the predicted points that was found, and position deviation."""
+    """Inliers of a pose, visibility ratio, and standard deviation of the position."""
 
     n_inliers: float
     found: float
     deviation: float
 
     def moved_to(self, other: PoseStatistics) -> PoseStatistics:
-        """A step towards those of a newer frame."""
+        """Return the means, moved towards the values of a newer frame."""
         return PoseStatistics(
             self.n_inliers + _GAIN * (other.n_inliers - self.n_inliers),
             self.found + _GAIN * (other.found - self.found),
@@ -35,34 +35,34 @@ class PoseStatistics:
 
 @dataclass(frozen=True)
 class SceneStatistics:
-    """What is usual in the frames before: of the scene, and of the images."""
+    """Usual values in the frames before: of the scene, and of the images."""
 
     usual: PoseStatistics | None = None
-    """Of frames with strong evidence in this place; None: not known."""
+    """Means of frames with strong evidence at this place; None: not known."""
     error: float | None = None
-    """Median match error, in standard deviations; it depends on camera and images, not on the
-    place. None: not known."""
+    """Mean of the median match errors, in standard deviations; it depends on camera and images, not
+    on the place. None: not known."""
     error_spread: float = 0.0
-    """Mean absolute deviation of that error."""
+    """Mean absolute deviation of the median match error."""
 
     def elsewhere(self) -> SceneStatistics:
-        """The camera is in another place, or in another map."""
+        """Return the state with the camera at another place, or in another map."""
         return replace(self, usual=None)
 
     def is_sudden_error(self, error: float, limits: AcceptanceConfig) -> bool:
-        """Whether a median match error exceeds the mean by more than it varies."""
+        """Return whether a median match error exceeds the mean by much more than its deviation."""
         usual = self.error
         if usual is None or usual <= 0:
             return False
         return error > max(limits.weak_error * usual, usual + _ERROR_SPREADS * self.error_spread)
 
     def with_pose(self, pose: PoseStatistics) -> SceneStatistics:
-        """The statistics with an accepted frame of strong evidence."""
+        """Return the statistics with an accepted frame of strong evidence."""
         usual = pose if self.usual is None else self.usual.moved_to(pose)
         return replace(self, usual=usual)
 
     def with_error(self, error: float, limits: AcceptanceConfig) -> SceneStatistics:
-        """The statistics with any accepted frame, by its median match error."""
+        """Return the statistics with the median match error of any accepted frame."""
         if not math.isfinite(error):
             return self
         gain = _SLOW_GAIN if self.is_sudden_error(error, limits) else _GAIN

@@ -15,12 +15,12 @@ from orbslam2py.slam.state.scene import SceneStatistics
 
 @dataclass(frozen=True)
 class SinceKeyframe:
-    """What has been tracked since the last keyframe was inserted."""
+    """What has been tracked since the last keyframe."""
 
     frame_id: int = 0
-    """The frame that became it."""
+    """The frame that became the last keyframe."""
     keyframe: int = -1
-    """Its id; -1 if there was none."""
+    """Id of the last keyframe; -1 if there was none."""
     most_inliers: int = 0
     """Most inliers of one frame since then, or since a relocalization."""
 
@@ -34,23 +34,24 @@ class State:
     """The state of tracking: a value, which `next_state` replaces."""
 
     phase: TrackingState = TrackingState.NO_IMAGES_YET
-    """Before the first map, tracked, or lost."""
+    """Not initialized, tracked, or lost."""
     motion: Motion = field(default_factory=Motion)
     """The last frame with a pose, and the velocity."""
     tracked_since: int = 0
-    """Frame of the last relocalization, or of the last map that began beside others."""
+    """Frame of the last relocalization, or the first frame of the last map that began beside
+    others."""
     found_again: bool = False
     """It was a relocalization."""
     scene: SceneStatistics = field(default_factory=SceneStatistics)
-    """What is usual in the frames before."""
+    """Usual values in the frames before."""
     reference_keyframe: int = -1
-    """Shares most points with the last frame that had a pose; -1 before the first."""
+    """The keyframe that shares most points with the last frame with a pose; -1 before the first."""
     local_map: core.LocalMap | None = None
-    """Where the last frame was refined; None before the first."""
+    """The local map of the last refined frame; None before the first."""
     since_keyframe: SinceKeyframe = field(default_factory=SinceKeyframe)
     """What has been tracked since the last keyframe."""
     n_uncertain: int = 0
-    """Frames in a row with weak evidence."""
+    """Number of frames in a row with weak evidence."""
     is_scarce: bool = False
     """The last pose has few inliers."""
     beyond_map: bool = False
@@ -63,16 +64,16 @@ class State:
     n_lost: int = 0
     """Images in a row without a pose."""
     unconfirmed: Unconfirmed | None = None
-    """The last frame was relocalized; this one has to confirm it."""
+    """The last frame was relocalized; the present one must confirm it."""
     keyframe_candidate: core.TrackedFrame | None = None
-    """That frame becomes a keyframe once it is confirmed."""
+    """This relocalized frame becomes a keyframe after its confirmation."""
     seeks_map: bool = False
-    """Lost for so long that the initializer gets the frames, too."""
+    """Tracking has been lost so long that the initializer gets the frames, too."""
 
     kept_maps: frozenset[int] = frozenset()
     """Maps that are never dropped: loaded ones, and those used in localization mode."""
     in_loaded_map: bool = False
-    """The camera has not been found yet in the map that was loaded."""
+    """The camera has not been found yet in the loaded map."""
     initial_pose: core.Pose | None = None
     """``T_cw`` in a loaded map, given by the user; used until a frame is relocalized."""
     n_relocalizations: int = 0
@@ -97,19 +98,19 @@ class State:
         )
 
     def has_just_begun(self, frame_id: int, limits: TrackingConfig) -> bool:
-        """Whether this frame or the one right before was relocalized, or began a map."""
+        """Return whether this frame or the one before was relocalized, or began a map."""
         return frame_id < self.tracked_since + limits.frames_after_relocalization
 
     def relocalized(self, frame_id: int) -> State:
-        """A frame was found without its predecessor."""
+        """Return the state after a frame was found without a prediction."""
         return replace(self, tracked_since=frame_id, found_again=True)
 
     def map_begun(self, frame_id: int) -> State:
-        """A map begins that is not the first."""
+        """Return the state after the start of a map that is not the first."""
         return replace(self, tracked_since=frame_id, found_again=False)
 
     def elsewhere(self) -> State:
-        """The camera is in another place, or in another map."""
+        """Return the state with the camera at another place, or in another map."""
         return replace(self, scene=self.scene.elsewhere(), n_uncertain=0)
 
     def in_another_map(self) -> State:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What leads from one state of tracking to the next: a pure function of state and event.
+"""The transitions of the tracking state: a pure function of state and event.
 
 The table of all transitions is in ``docs/method/tracking.md#state``.
 """
@@ -25,7 +25,7 @@ from orbslam2py.slam.state.state import SinceKeyframe, State
 # ---- events --------------------------------------------------------------------------------------
 @dataclass(frozen=True, eq=False)
 class NotInitialized:
-    """The frame cannot begin a map, and there is none."""
+    """The frame cannot begin a map, and there is no map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Relocalized:
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """The frame has an accepted pose, which follows from the frame before and confirms it."""
+    """The frame has an accepted pose, follows the frame before, and confirms it."""
 
     frame: core.TrackedFrame
     n_inliers: int
@@ -71,12 +71,12 @@ class KeyframeInserted:
 
 @dataclass(frozen=True)
 class SearchForMap:
-    """Tracking has been lost for so long that another map may begin."""
+    """Tracking has been lost so long that another map may begin."""
 
 
 @dataclass(frozen=True)
 class MapDropped:
-    """The active map was dropped; others are left."""
+    """The active map was dropped; others remain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ class Transitions:
         return not state.unconfirmed.is_confirmed_by(frame, self._relocalization)
 
     def next_state(self, state: State, event: Event) -> tuple[State, tuple[Action, ...]]:
-        """Return the state after an event, and what is to be done, in this order.
+        """Return the state after an event, and the actions in their order.
 
         Parameters
         ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The live page in a process of its own: tracking shares no interpreter with who draws."""
+"""The live page in a separate process: tracking shares no interpreter with the drawing."""
 
 from orbslam2py.viewer.process.companion import Companion, CompanionError
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plain data from one process to another, through a socket that both were born with.
+"""Plain data from one process to another, through an inherited socket.
 
-A message is pickled (protocol 5, PEP 574): arrays go through the socket as they lie in memory, and
-nothing of them is copied while the interpreter lock is held.
+A message is pickled (protocol 5, PEP 574): arrays are sent directly from memory, and nothing is
+copied while the interpreter lock is held.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _PATIENCE = 120
 
 
 class Channel:
-    """One end of a socket, for whole messages: tuples of a name and what belongs to it.
+    """One end of a socket, for complete messages: tuples of a name and its arguments.
 
     Several threads may send; one receives.
 
     Parameters
     ----------
     end : socket.socket
-        Connected; closed with the channel.
+        Connected socket; closed with the channel.
     """
 
     def __init__(self, end: socket.socket) -> None:
@@ -45,12 +45,12 @@ class Channel:
         self._sending = threading.Lock()
 
     def send(self, *message: Any) -> None:
-        """Send a message; returns when the system has it.
+        """Send a message; returns when the operating system has accepted it.
 
         Raises
         ------
         TimeoutError
-            If the other end takes nothing.
+            If the other end accepts nothing.
         OSError
             If it is closed.
         """
@@ -98,7 +98,7 @@ class Channel:
         return data
 
     def close(self) -> None:
-        """Close it, which wakes whoever waits at either end."""
+        """Close it, which ends waits at both ends."""
         with contextlib.suppress(OSError):  # the other end is gone already
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process of the page, as seen from the one that tracks: started, told, answered, ended."""
+"""The process of the page, from the side of tracking: start, messages, answers, end."""
 
 from __future__ import annotations
 
@@ -39,25 +39,25 @@ class CompanionError(OrbSlamError):
 
 
 class Companion:
-    """A process that draws what this one sees, and passes on what people ask for.
+    """A process that draws the data of this one, and forwards the user's requests.
 
-    It has a low priority, ends with this process whatever ends it, and is not reached by Ctrl-C.
+    It has a low priority, ends with this process in any case, and ignores Ctrl-C.
 
     Parameters
     ----------
     host, port, title, stand_back
         See `LiveView`.
     answers : mapping of str to callable
-        What it may ask of this process; each call is made in a thread of its own.
+        Requests that it may make to this process; each call is made in a separate thread.
     on_end : callable
-        Called when it has ended, in a thread of its own; again after whatever it had asked for.
+        Called at its end, in a separate thread; again after a request that was still running.
 
     Attributes
     ----------
     address : str
         Where its page is.
     ended : threading.Event
-        Set when it is no more.
+        Set after its end.
 
     Raises
     ------
@@ -107,7 +107,7 @@ class Companion:
 
     @property
     def why(self) -> str:
-        """Why it has ended, in words."""
+        """Why it has ended, as text."""
         return self._why
 
     def _open(self, *wishes: str | int | None) -> str:
@@ -126,7 +126,7 @@ class Companion:
 
     # ---- to the other process --------------------------------------------------------------------
     def tell(self, *message: Any) -> None:
-        """Send a small message at once.
+        """Send a small message immediately.
 
         Raises
         ------
@@ -144,9 +144,9 @@ class Companion:
         raise CompanionError(self._why or "its process has ended")
 
     def show(self, *message: Any) -> None:
-        """Send what is to be drawn; waits until what came before is, but for one.
+        """Send data for drawing; waits until all earlier messages except one are processed.
 
-        So nothing piles up, and a page that is slow is shown less.
+        So messages do not accumulate, and a slow page gets fewer of them.
 
         Raises
         ------

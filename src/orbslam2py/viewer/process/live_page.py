@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page of a system that works in another process."""
+"""The page of a system that runs in another process."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ _REST = 30.0
 
 
 class LivePage:
-    """Draws what the other process tells, and asks it what people want.
+    """Draws the data of the other process, and sends it the user's requests.
 
     Parameters
     ----------
     ask : callable
-        Has something done in the other process: its name and arguments; returns what came of it.
+        Calls a function in the other process: its name and arguments; returns the result.
     host, port, title
         See `LiveView`.
 
@@ -68,11 +68,11 @@ class LivePage:
 
     @property
     def address(self) -> str:
-        """What a person types into a browser."""
+        """Address of the page for a browser."""
         return self.page.address
 
     def attach(self, subject: Subject) -> None:
-        """Learn whose page it is."""
+        """Get the description of the system."""
         with self._lock:
             self._subject = subject
             self.page.scene.fov = subject.fov
@@ -88,7 +88,7 @@ class LivePage:
 
     # ---- notifications ---------------------------------------------------------------------------
     def on_frame(self, view: FrameView, localization: bool) -> None:
-        """Show an image, where it was taken, and the mode that the next one is tracked in."""
+        """Show an image, its pose, and the mode for the next one."""
         with self._lock:
             self._shown_at = time.perf_counter()
             self._n_dropped = view.queue.n_dropped
@@ -110,7 +110,7 @@ class LivePage:
                 self._show(view)
 
     def on_map(self, changes: MapChanges) -> None:
-        """Show what has become of the map."""
+        """Show the changes of the map."""
         with self._lock:
             self._shown_at = time.perf_counter()
             self.page.model.apply(changes)
@@ -121,7 +121,7 @@ class LivePage:
                 self._draw_paths()
 
     def on_resting_maps(self, maps: RestingMaps) -> None:
-        """Show the maps that rest beside the active one."""
+        """Show the inactive maps beside the active one."""
         with self._lock:
             self._shown_at = time.perf_counter()
             self._n_resting = len(maps.there)
@@ -131,7 +131,7 @@ class LivePage:
                 self._show_status()
 
     def on_event(self, event: LoopClosed | MapsMerged) -> None:
-        """Tell that a loop was closed, or that two maps are one now."""
+        """Report a loop closure or a merge."""
         if isinstance(event, MapsMerged):
             self.page.tell(
                 "Maps merged",
@@ -146,7 +146,7 @@ class LivePage:
         )
 
     def close(self, n_dropped: int) -> None:
-        """Show the last of it; the page stays."""
+        """Show the final state; the page stays open."""
         with self._lock:
             self._n_dropped = n_dropped
             if self._run_controls is not None:
@@ -155,13 +155,13 @@ class LivePage:
             self._refresh()
 
     def tell_end(self, text: str) -> None:
-        """Say below the image that the run has ended."""
+        """Show below the image that the run has ended."""
         with self._lock:
             self._end = text
             self._show_status()
 
     def look_from(self, eye: FloatArray, target: FloatArray) -> None:
-        """Let all browsers look from one place to another, and stay there."""
+        """Move the view of all browsers to a position, looking at another, and keep it there."""
         self.page.look_from(eye, target)
 
     def stop(self) -> None:
@@ -171,7 +171,7 @@ class LivePage:
         self.page.stop()
 
     def _catch_up(self) -> None:
-        """When nothing comes any more, draw what was left out for want of time."""
+        """Draw the parts that were postponed, when no messages come any more."""
         while not self._stopping.wait(_STILL):
             with self._lock:
                 still = self._shown_at is not None and time.perf_counter() > self._shown_at + _STILL
@@ -269,7 +269,7 @@ class LivePage:
 
 
 def _colours_of_points(view: FrameView) -> tuple[np.ndarray, ByteArray]:
-    """Ids of the points that were matched, and the colours of the image there."""
+    """Return ids of the matched points, and the colours of the image at them."""
     ids = view.features.map_point_ids
     seen = (ids >= 0) & ~view.visual_odometry
     pixels = np.rint(view.pixels[seen]).astype(np.int64)

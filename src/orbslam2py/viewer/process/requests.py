@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the buttons of the page ask of the process that tracks."""
+"""Requests of the page's buttons to the process of tracking."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class RequestsToSystem:
         return _words(self._ask("reset"))
 
     def optimize(self) -> str | None:
-        """Refine the whole map, now."""
+        """Run full bundle adjustment of the whole map now."""
         return _words(self._ask("optimize"))
 
     def save(self) -> str | None:
-        """Write the map into a file."""
+        """Write the map to a file."""
         return _words(self._ask("save"))
 
 
@@ -54,7 +54,7 @@ class RequestsToRun:
 
     @property
     def paused(self) -> bool:
-        """Whether it stands still: nobody else holds it."""
+        """Whether it is paused by this page."""
         return self._paused
 
     def pause(self) -> None:

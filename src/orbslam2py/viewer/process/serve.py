@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process of the page: draws what the run sends, and asks it for what people want to see."""
+"""The process of the page: draws the data of the run, and requests more for its users."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _PACED = frozenset({"on_frame", "on_map", "on_resting_maps", "on_event"})
 
 
 class Parent:
-    """The process that tracks, as seen from that of the page.
+    """The process of tracking, from the side of the page.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ class Parent:
         self._n_asked = 0
 
     def tell(self, *message: Any) -> None:
-        """Send a message; one to nobody ends this process."""
+        """Send a message; without a receiver this process ends."""
         try:
             self._channel.send(*message)
         except OSError:
             os._exit(0)
 
     def ask(self, name: str, *arguments: Any) -> Any:
-        """Have something done there, and wait for what comes of it; None if it failed."""
+        """Call a function there, and wait for the result; None if it failed."""
         with self._condition:
             self._n_asked += 1
             number = self._n_asked
@@ -62,7 +62,7 @@ class Parent:
             return self._answers.pop(number)
 
     def read(self) -> None:
-        """Take what comes, until the other process is no more: then this one ends, too."""
+        """Process messages until the other process ends; then this one ends, too."""
         while (message := self._channel.receive()) is not None:
             if message[0] == "answer":
                 with self._condition:
@@ -74,7 +74,7 @@ class Parent:
 
 
 class _LogToParent(logging.Handler):
-    """Hands messages of the package to the other process, which knows what becomes of them."""
+    """Forwards log messages of the package to the other process, which handles them."""
 
     def __init__(self, parent: Parent) -> None:
         super().__init__(logging.WARNING)
@@ -85,12 +85,12 @@ class _LogToParent(logging.Handler):
 
 
 def main(number: int) -> None:
-    """Serve until the other process says stop, or is no more.
+    """Serve until the other process sends stop, or ends.
 
     Parameters
     ----------
     number : int
-        File descriptor of the socket that leads to it.
+        File descriptor of the socket to it.
     """
     _end_with(os.getppid())
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the run
@@ -109,7 +109,7 @@ def main(number: int) -> None:
 
 
 def _end_with(process: int) -> None:
-    """End when the other process does; a copy of its socket may live on in a child of its own."""
+    """End with the other process; a copy of its socket may remain in one of its children."""
 
     def watch() -> None:
         while os.getppid() == process:
@@ -136,9 +136,9 @@ def _open(parent: Parent, host: str, port: int | None, title: str) -> LivePage |
 
 
 def _stand_back() -> None:
-    """Take only time that nobody else wants, where the system knows such a thing (Linux).
+    """Use only idle time of the processor, if the system supports this (Linux).
 
-    A thread that is merely less urgent keeps its core for some milliseconds when tracking wakes up.
+    A thread of lower priority keeps its core for some milliseconds when tracking wakes up.
     """
     if not hasattr(os, "SCHED_IDLE"):
         return
