@@ -315,8 +315,8 @@ class CameraRectification(MadeAgainByCopies):
     K
         Raw camera matrix (3, 3), pixels.
     D
-        Raw distortion, 4, 5, 8 or 12 coefficients; of a fisheye model its parameters after fx, fy, cx,
-        cy, as `orbslam2py.CameraModel` orders them.
+        Raw distortion, 4, 5, 8 or 12 coefficients; of a fisheye model its parameters after fx, fy,
+        cx, cy, as `orbslam2py.CameraModel` orders them.
     R
         Rotation (3, 3) from raw to rectified camera coordinates.
     P

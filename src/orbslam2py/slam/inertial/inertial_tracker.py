@@ -296,7 +296,7 @@ class InertialTracker:
         )
 
     def keyframe_made(self, keyframe: int, frame: core.TrackedFrame) -> None:
-        """Note velocity and biases of a frame, the last one that was tracked, that is a keyframe."""
+        """Note velocity and biases of the last tracked frame, which became a keyframe."""
         if self.filter is not None and frame.T_cw is not None:
             velocity = frame.T_cw.rotation_matrix @ self.filter.velocity
             self.keyframes.set(keyframe, velocity, self.filter.bias)
