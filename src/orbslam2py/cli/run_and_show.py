@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import shlex
 import sys
 from collections.abc import Iterable
@@ -35,6 +36,9 @@ from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.slam.system import System
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
+
+#: A password in the address of a camera; reports are given to others.
+_PASSWORD = re.compile(r"(\w://[^\s/:@]*:)[^\s/@]*@")
 
 
 def run_and_show(
@@ -109,7 +113,9 @@ def run_and_show(
                     output=output,
                     force=force,
                     report_page=report_page,
-                    command=shlex.join(["orbslam2py", *sys.argv[1:]]),
+                    command=_PASSWORD.sub(
+                        r"\1PASSWORD@", shlex.join(["orbslam2py", *sys.argv[1:]])
+                    ),
                     progress=progress,
                     control=viewing.control,
                     watch=watch_all(

@@ -196,11 +196,11 @@ class Inlet:
                 "images_late": sum(self._clock.n_late.get(name, 0) for name in self._images),
                 "images_of_other_size": self.n_of_other_size,
                 "images_broken": self.n_broken,
-                "clock_jumps": self._clock.n_jumps,
-                "slow_periods": self.rate.n_low,
             }
             if len(self._images) > 1:
                 counts["worst_skew_ms"] = round(self.pairing.worst * 1e3, 3)
+            counts["clock_jumps"] = self._clock.n_jumps
+            counts["slow_periods"] = self.rate.n_low
             if self.has_imu:
                 queue = self.imu_queue
                 counts["imu_samples"] = queue.n

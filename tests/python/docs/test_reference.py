@@ -17,6 +17,7 @@ import pytest
 
 import orbslam2py
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.live import LiveStream
 from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.result import DROPPED
 from orbslam2py.settings import BUILTIN_NAMES, keys
@@ -26,12 +27,13 @@ from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import Reason, TrackingState
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.documents import ROOT, cells_of, code_in, headings_of, prose_of, read, table_below
+from support.faulty_camera import FaultyCamera
 
 REFERENCE = ROOT / "docs/reference"
 ROOMS = (
     *("settings", "trajectory", "evaluation", "vocabulary", "maps"),
     *("datasets", "synthetic", "calibration", "runs", "batches"),
-    *("viewer", "recordings", "pictures"),
+    *("viewer", "recordings", "pictures", "live"),
 )
 
 
@@ -152,6 +154,11 @@ def test_files_page_lists_the_keys_of_entries() -> None:
     assert tables_below("An entry of merges") == list(report.merge_entry(merge))
     listed = tables_below("An entry of full_adjustments")
     assert listed == list(report.adjustment_entry(adjustment))
+
+
+def test_files_page_lists_the_keys_of_the_input() -> None:
+    source = LiveStream(FaultyCamera(), settings="euroc")
+    assert tables_below("The entry input") == list(source.counts())
 
 
 def _filled(kind: type, values: dict[str, Any]) -> Any:

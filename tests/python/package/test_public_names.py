@@ -77,7 +77,7 @@ NAMES = {
 #: Names that users import from rooms, as the examples do; a room may offer more.
 ROOMS = {
     "calibration": ["Board", "Calibration", "calibrate", "find_views", "read_camera_file"],
-    "datasets": ["ImageFolder", "Images", "LiveCamera", "Sequence", "VideoSequence", "open_input"],
+    "datasets": ["ImageFolder", "Images", "LiveFrame", "Sequence", "VideoSequence"],
     "live": ["Device", "LiveCamera", "LiveStream", "Request", "Sink", "open_source"],
     "evaluation": ["Alignment", "align", "evaluate_trajectory", "lap_error"],
     "maps": [
@@ -128,6 +128,13 @@ def test_everything_offered_is_there() -> None:
 def test_names_of_rooms(room: str) -> None:
     module = importlib.import_module(f"orbslam2py.{room}")
     assert set(ROOMS[room]) <= set(module.__all__)
+
+
+def test_names_that_moved_are_still_there() -> None:
+    from orbslam2py import datasets, live  # noqa: PLC0415
+
+    assert datasets.LiveCamera is live.LiveCamera
+    assert datasets.open_input is live.open_source is orb.open_source
 
 
 def described(thing: object) -> bool:
