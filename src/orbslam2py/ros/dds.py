@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import secrets
+import sys
 import threading
 from typing import Any
 
@@ -58,11 +59,11 @@ _MOST_ENDPOINTS = 10_000
 
 _RECEIVE_BUFFER = '<Internal><SocketReceiveBufferSize min="default" max="8MiB"/></Internal>'
 _LOCAL = (
-    f'<General><Interfaces><NetworkInterface name="{LOOPBACK}"/></Interfaces>'
+    f'<General><Interfaces><NetworkInterface address="{LOOPBACK}"/></Interfaces>'
     "<AllowMulticast>false</AllowMulticast></General>"
     "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
     "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-    '<Peers><Peer Address="127.0.0.1"/></Peers></Discovery>'
+    f'<Peers><Peer Address="{LOOPBACK}"/></Peers></Discovery>'
 )
 #: Domains of this process; each is configured once, and lives as long as the process.
 _domains: dict[int, tuple[Domain | None, str]] = {}
@@ -132,7 +133,7 @@ class DdsTransport:
 
     def publish(self, name: str, kind: str, *, latched: bool = False) -> Publication:
         """Publish a topic; see `Transport.publish`."""
-        qos = _quality(1 if latched else _DEPTH, latched=latched, data=f"typehash={_hash(kind)};")
+        qos = _quality(1 if latched else _DEPTH, latched=latched, data=f"typehash={type_hash(kind)};")
         made = self._topic(f"{_TOPIC}{name}", kind)
         return self._write(DataWriter(self._participant, made, qos=qos), name)
 
@@ -264,10 +265,6 @@ def _quality(depth: int, *, reliable: bool = True, latched: bool = False, data: 
     return Qos(*policies)
 
 
-def _hash(kind: str) -> str:
-    return type_hash(kind)
-
-
 def _configure(number: int) -> str:
     """Configure a domain unless it is; returns the interfaces that it uses, for the user."""
     with _domains_lock:
@@ -285,8 +282,10 @@ def _configure(number: int) -> str:
 
 def _configuration() -> tuple[str, str]:
     interfaces = [] if is_local_only() else network_interfaces()
-    if not interfaces:
-        general, where = _LOCAL, f"{LOOPBACK} (127.0.0.1), to nodes of this computer only"
+    if not interfaces and not is_local_only() and sys.platform != "linux":
+        general, where = "", "the network interface that Cyclone DDS chooses"
+    elif not interfaces:
+        general, where = _LOCAL, f"lo ({LOOPBACK}), to nodes of this computer only"
     else:
         named = "".join(f'<NetworkInterface name="{one.name}"/>' for one in interfaces)
         general = f"<General><Interfaces>{named}</Interfaces></General>"
