@@ -97,7 +97,7 @@ class DdsTransport:
         try:
             self._participant = DomainParticipant(self.domain)
         except DDSException as error:
-            raise _not_joined(self.domain, error) from error
+            raise _not_joined(self.domain) from error
         self._builtin = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
 
     def topics(self) -> list[LiveTopic]:
@@ -133,7 +133,8 @@ class DdsTransport:
 
     def publish(self, name: str, kind: str, *, latched: bool = False) -> Publication:
         """Publish a topic; see `Transport.publish`."""
-        qos = _quality(1 if latched else _DEPTH, latched=latched, data=f"typehash={type_hash(kind)};")
+        depth, data = 1 if latched else _DEPTH, f"typehash={type_hash(kind)};"
+        qos = _quality(depth, latched=latched, data=data)
         made = self._topic(f"{_TOPIC}{name}", kind)
         return self._write(DataWriter(self._participant, made, qos=qos), name)
 
@@ -276,7 +277,7 @@ def _configure(number: int) -> str:
                 try:
                     _domains[number] = Domain(number, xml), where
                 except DDSException as error:
-                    raise _not_joined(number, error) from error
+                    raise _not_joined(number) from error
         return _domains[number][1]
 
 
@@ -293,8 +294,11 @@ def _configuration() -> tuple[str, str]:
     return f"<CycloneDDS><Domain>{general}{_RECEIVE_BUFFER}</Domain></CycloneDDS>", where
 
 
-def _not_joined(number: int, error: DDSException) -> DatasetError:
-    return DatasetError(
-        f"ros2: domain {number} cannot be joined ({error.msg}); check the network, or the file "
-        "that CYCLONEDDS_URI names"
+def _not_joined(number: int) -> DatasetError:
+    uri = os.environ.get("CYCLONEDDS_URI")
+    remedy = (
+        f"correct the configuration that CYCLONEDDS_URI names ({uri}), or unset it"
+        if uri
+        else "see whether the network is up; CYCLONEDDS_URI may name its interface"
     )
+    return DatasetError(f"ros2: domain {number} cannot be joined; {remedy}")
