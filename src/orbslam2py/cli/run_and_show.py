@@ -113,9 +113,7 @@ def run_and_show(
                     output=output,
                     force=force,
                     report_page=report_page,
-                    command=_PASSWORD.sub(
-                        r"\1PASSWORD@", shlex.join(["orbslam2py", *sys.argv[1:]])
-                    ),
+                    command=_command(),
                     progress=progress,
                     control=viewing.control,
                     watch=watch_all(
@@ -138,6 +136,11 @@ def run_and_show(
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED
     return code
+
+
+def _command() -> str:
+    """Return the line that repeats the run, without passwords."""
+    return _PASSWORD.sub(r"\1PASSWORD@", shlex.join(["orbslam2py", *sys.argv[1:]]))
 
 
 def _input_recorder(

@@ -17,6 +17,9 @@ from support import made_kind
 from support import small_sequences as small
 from support.command_line import CommandLine
 
+#: Frames of a run.
+N = 16
+
 pytestmark = pytest.mark.watchdog(100)
 
 
@@ -32,26 +35,28 @@ def test_run_and_repeat_it(command: CommandLine) -> None:
     pytest.importorskip("mcap", reason="pip install orbslam2py[bags]")
     done = command(
         *("run", "made:", "--imu", "--record-input", "in.mcap", "--output", "live"),
-        *("--max-frames", made_kind.N, "--no-report"),
+        *("--max-frames", N, "--no-report"),
     )
     assert done.code == 0, done.err
     assert "What came in is in in.mcap" in done.out
     assert "from exposure to pose" in done.out
     report = json.loads(Path("live/report.json").read_text())
     assert report["layout"] == "made"
-    assert report["tracked"] == made_kind.N
-    assert (report["input"]["frames"], report["input"]["imu_samples"]) == (20, 80)
+    assert report["tracked"] >= N - 1
+    assert report["input"]["frames"] >= N
+    assert report["input"]["imu_samples"] >= 4 * N
     total = report["milliseconds"]["latency.total"]
-    assert total["count"] == made_kind.N
+    assert total["count"] == N
     assert total["median"] >= report["milliseconds"]["latency.track"]["median"]
     assert report["milliseconds"]["latency.transport"]["median"] == pytest.approx(2, abs=2)
     settings = Settings.load("live/settings.yaml", "stereo")
     assert settings == small.sequence(Sensor.STEREO).settings
-    again = command("run", "in.mcap", "--deterministic", "--output", "again", "--no-report")
+    again = command("run", "in.mcap", "--deterministic", "--output", "again", "--max-frames", N)
     assert again.code == 0, again.err
     live, repeated = (read_tum(f"{name}/trajectory.txt") for name in ("live", "again"))
-    np.testing.assert_array_equal(live.timestamps, repeated.timestamps)
-    apart = np.linalg.norm(live.T_wc[:, :3, 3] - repeated.T_wc[:, :3, 3], axis=1)
+    _, i, j = np.intersect1d(live.timestamps, repeated.timestamps, return_indices=True)
+    assert len(i) >= N - 4  # a frame may have been dropped
+    apart = np.linalg.norm(live.T_wc[i, :3, 3] - repeated.T_wc[j, :3, 3], axis=1)
     assert apart.max() < 0.02
 
 

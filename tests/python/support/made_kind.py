@@ -11,7 +11,8 @@ from support import small_sequences as small
 from support.faulty_camera import FaultyCamera
 
 KIND = Kind("made", "made:", "a camera that is none", "support.made_kind")
-N = 20
+#: Frames that are delivered: the first ones come before a run begins.
+N = 70
 
 
 def open_device(request: Request) -> FaultyCamera:
@@ -21,7 +22,7 @@ def open_device(request: Request) -> FaultyCamera:
 
     streams: tuple[Stream, ...] = ("left", "right", "imu") if request.imu else ("left", "right")
     settings = small.sequence(Sensor.STEREO).settings
-    return FaultyCamera(N, 8, streams=streams, settings=settings, images=image)
+    return FaultyCamera(N, 10, streams=streams, settings=settings, images=image)
 
 
 def find_devices() -> list[FoundDevice]:
