@@ -172,7 +172,7 @@ class Publishing:
 
     def _connect(self, *, in_time: bool) -> None:
         from orbslam2py.ros.base_frame import base_of_camera, choose_base, for_viewers  # noqa: PLC0415  # slow to load
-        from orbslam2py.ros.connect import connect, connect_foxglove  # noqa: PLC0415
+        from orbslam2py.ros.connect import announce, connect, connect_foxglove  # noqa: PLC0415
         from orbslam2py.ros.device import TopicsDevice  # noqa: PLC0415
         from orbslam2py.ros.stamps import StampedSource, device_of, nanoseconds  # noqa: PLC0415
 
@@ -189,7 +189,10 @@ class Publishing:
             stamped = StampedSource(cast(LiveSource, sequence))
             self._stamp_of, self.sequence = stamped.stamp_of, cast(LiveSource, stamped)
         if options.network is not None:
-            self._outputs.append(_Output(connect(options.network), base, self._map_path))
+            transport = connect(options.network)
+            self._outputs.append(_Output(transport, base, self._map_path))
+            if topics is None or options.network != topics.name:
+                announce(transport)  # the topics have told where they come from
         if options.foxglove:
             app = connect_foxglove(options.foxglove_host, options.foxglove_port)
             self._outputs.append(_Output(app, for_viewers(base), with_images=True))

@@ -98,6 +98,8 @@ EXAMPLE = """
 
     orbslam2py run realsense: --sensor stereo --imu --record-input drive.mcap
 
+    orbslam2py run ros2: --sensor stereo
+
     orbslam2py run video.mp4 --sensor mono --settings my.yaml --save office.orbmap
 
     orbslam2py run video.mp4 --load office.orbmap --localize

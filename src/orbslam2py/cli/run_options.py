@@ -19,7 +19,8 @@ SequenceArgument = Annotated[
         help="Folder of a TUM RGB-D, KITTI or EuRoC sequence; folder of images, or one that holds "
         "a folder of images and one of depth, or images of a left and a right camera; bag of "
         "ROS 1 or ROS 2 (.bag, .db3, .mcap, or its folder); video file; live source (ends with "
-        "Ctrl-C): number of a camera, v4l:0, realsense:SERIAL, oak:ID, rtsp://HOST/PATH. "
+        "Ctrl-C): number of a camera, v4l:0, realsense:SERIAL, oak:ID, rtsp://HOST/PATH, topics of "
+        "ROS 2 (ros2: or zenoh:). "
         "'orbslam2py devices' lists what is plugged in."
     ),
 ]
@@ -59,7 +60,7 @@ TimesOption = Annotated[
 TopicsOption = Annotated[
     str | None,
     typer.Option(
-        help="Topics of a bag: left (or image), right, depth, info, right_info, "
+        help="Topics of a bag or a robot: left (or image), right, depth, info, right_info, "
         "depth_info, truth  "
         "[guessed by types and names].",
         metavar="left=/a,right=/b",

@@ -37,8 +37,8 @@ def open_source(
     ----------
     source
         A live source: ``realsense:`` or ``realsense:SERIAL``, ``oak:`` or ``oak:ID``, ``v4l:0``,
-        ``rtsp://HOST/PATH``, the number of a camera (also as text); or whatever
-        `orbslam2py.datasets.open_recorded` opens. A file of that name goes first.
+        ``rtsp://HOST/PATH``, ``ros2:``, ``zenoh:``, the number of a camera (also as text); or
+        whatever `orbslam2py.datasets.open_recorded` opens. A file of that name goes first.
     sensor
         What to deliver images for; by default the richest there is.
     settings

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import importlib
+import logging
 from pathlib import Path
 
 from orbslam2py.errors import DatasetError
 from orbslam2py.ros.transport import Transport
 from orbslam2py.ros.types import missing_extra, type_store
+
+_log = logging.getLogger(__name__)
 
 _KINDS = {
     "ros2": ("orbslam2py.ros.dds", "DdsTransport"),
@@ -37,6 +40,14 @@ def connect(name: str) -> Transport:
         raise missing_extra(error.name or str(error), prefix) from error
     transport: Transport = opened(address)
     return transport
+
+
+def announce(transport: Transport) -> None:
+    """Tell the user where a run is published."""
+    _log.info(
+        "%s: published in domain %d, on %s",
+        *(transport.prefix, transport.domain, transport.where),
+    )
 
 
 def connect_foxglove(

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import secrets
+import sys
 import threading
 from typing import Any
 
@@ -58,11 +59,11 @@ _MOST_ENDPOINTS = 10_000
 
 _RECEIVE_BUFFER = '<Internal><SocketReceiveBufferSize min="default" max="8MiB"/></Internal>'
 _LOCAL = (
-    f'<General><Interfaces><NetworkInterface name="{LOOPBACK}"/></Interfaces>'
+    f'<General><Interfaces><NetworkInterface address="{LOOPBACK}"/></Interfaces>'
     "<AllowMulticast>false</AllowMulticast></General>"
     "<Discovery><ParticipantIndex>auto</ParticipantIndex>"
     "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-    '<Peers><Peer Address="127.0.0.1"/></Peers></Discovery>'
+    f'<Peers><Peer Address="{LOOPBACK}"/></Peers></Discovery>'
 )
 #: Domains of this process; each is configured once, and lives as long as the process.
 _domains: dict[int, tuple[Domain | None, str]] = {}
@@ -96,7 +97,7 @@ class DdsTransport:
         try:
             self._participant = DomainParticipant(self.domain)
         except DDSException as error:
-            raise _not_joined(self.domain, error) from error
+            raise _not_joined(self.domain) from error
         self._builtin = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
 
     def topics(self) -> list[LiveTopic]:
@@ -132,7 +133,8 @@ class DdsTransport:
 
     def publish(self, name: str, kind: str, *, latched: bool = False) -> Publication:
         """Publish a topic; see `Transport.publish`."""
-        qos = _quality(1 if latched else _DEPTH, latched=latched, data=f"typehash={_hash(kind)};")
+        depth, data = 1 if latched else _DEPTH, f"typehash={type_hash(kind)};"
+        qos = _quality(depth, latched=latched, data=data)
         made = self._topic(f"{_TOPIC}{name}", kind)
         return self._write(DataWriter(self._participant, made, qos=qos), name)
 
@@ -264,10 +266,6 @@ def _quality(depth: int, *, reliable: bool = True, latched: bool = False, data: 
     return Qos(*policies)
 
 
-def _hash(kind: str) -> str:
-    return type_hash(kind)
-
-
 def _configure(number: int) -> str:
     """Configure a domain unless it is; returns the interfaces that it uses, for the user."""
     with _domains_lock:
@@ -279,14 +277,16 @@ def _configure(number: int) -> str:
                 try:
                     _domains[number] = Domain(number, xml), where
                 except DDSException as error:
-                    raise _not_joined(number, error) from error
+                    raise _not_joined(number) from error
         return _domains[number][1]
 
 
 def _configuration() -> tuple[str, str]:
     interfaces = [] if is_local_only() else network_interfaces()
-    if not interfaces:
-        general, where = _LOCAL, f"{LOOPBACK} (127.0.0.1), to nodes of this computer only"
+    if not interfaces and not is_local_only() and sys.platform != "linux":
+        general, where = "", "the network interface that Cyclone DDS chooses"
+    elif not interfaces:
+        general, where = _LOCAL, f"lo ({LOOPBACK}), to nodes of this computer only"
     else:
         named = "".join(f'<NetworkInterface name="{one.name}"/>' for one in interfaces)
         general = f"<General><Interfaces>{named}</Interfaces></General>"
@@ -294,8 +294,11 @@ def _configuration() -> tuple[str, str]:
     return f"<CycloneDDS><Domain>{general}{_RECEIVE_BUFFER}</Domain></CycloneDDS>", where
 
 
-def _not_joined(number: int, error: DDSException) -> DatasetError:
-    return DatasetError(
-        f"ros2: domain {number} cannot be joined ({error.msg}); check the network, or the file "
-        "that CYCLONEDDS_URI names"
+def _not_joined(number: int) -> DatasetError:
+    uri = os.environ.get("CYCLONEDDS_URI")
+    remedy = (
+        f"correct the configuration that CYCLONEDDS_URI names ({uri}), or unset it"
+        if uri
+        else "see whether the network is up; CYCLONEDDS_URI may name its interface"
     )
+    return DatasetError(f"ros2: domain {number} cannot be joined; {remedy}")

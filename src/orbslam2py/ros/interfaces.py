@@ -8,7 +8,7 @@ import socket
 import struct
 from dataclasses import dataclass
 
-LOOPBACK = "lo"
+LOOPBACK = "127.0.0.1"
 #: Requests of ioctl(2) on Linux, and flags of an interface: see netdevice(7).
 _GET_FLAGS, _GET_ADDRESS = 0x8913, 0x8915
 _UP, _LOOPBACK_FLAG, _RUNNING, _MULTICAST = 0x1, 0x8, 0x40, 0x1000

@@ -319,8 +319,9 @@ def _opened(router: str, *, given: bool) -> Any:
         return zenoh.open(config)
     except zenoh.ZError as error:
         if path and not given:
+            why = str(error).partition(" at /")[0]  # where in Zenoh's code
             raise DatasetError(
-                f"zenoh: no session by the file of ZENOH_SESSION_CONFIG_URI, {path}: {error}; "
+                f"zenoh: no session by the file of ZENOH_SESSION_CONFIG_URI, {path}: {why}; "
                 "correct it, or unset the variable"
             ) from error
         raise DatasetError(

@@ -189,6 +189,8 @@ def test_examples_of_the_commands_run(
         for line in command.text_and_example()[1]:
             if line == "orbslam2py run 0 --sensor mono --settings my.yaml":
                 continue  # needs a camera
+            if line.startswith(("orbslam2py run realsense:", "orbslam2py run ros2:")):
+                continue  # needs a camera or a robot
             if "--viewer" in line or line.startswith("orbslam2py view "):
                 continue  # stays until Ctrl-C; tests/python/viewer drives it
             if line.startswith("orbslam2py check-imu "):
@@ -216,5 +218,5 @@ def test_all_others_run() -> None:
         if block.mark("not run") is not None
     }
     assert set(reasons.values()) <= NOT_RUN, reasons
-    assert len(reasons) <= 30, reasons
+    assert len(reasons) <= 32, reasons
     assert not os.environ.get("ORBSLAM2PY_VOCABULARY"), "the documents name the vocabulary"

@@ -174,3 +174,20 @@ def test_a_map_is_saved_on_request(router: str, bag: Path, run_here: CommandLine
     assert done.code == 0, done.err
     assert replies[0].message == f"saved in {Path('out/map.orbmap').resolve()}"
     assert Path("out/map.orbmap").stat().st_size > 10_000
+
+
+def test_a_bag_is_published_on_request_and_says_where(
+    router: str, bag: Path, run_here: CommandLine
+) -> None:
+    source = f"zenoh:{router}"
+    listener = Listener(connect(source))
+    done = run_here(
+        *("run", bag, "--sensor", "stereo", "--max-frames", 8, "--output", "out", "--no-report"),
+        *("--publish", source, "--realtime"),
+    )
+    listener.close()
+    assert done.code == 0, done.err
+    told = f"Note: zenoh: published in domain 0, on a connection to {router}, no port of its own"
+    assert told in done.err.splitlines()
+    assert "base_link is assumed to be at the camera" in done.err
+    assert listener.heard["/orbslam2py/path"][-1].header.frame_id == "map"

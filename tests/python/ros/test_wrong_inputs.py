@@ -40,6 +40,23 @@ def _refused(done: Outcome, *said: str) -> None:
     assert list(Path.cwd().iterdir()) == []
 
 
+def test_wrong_configurations_of_the_networks(
+    run_here: CommandLine, domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", "nowhere.xml")
+    _refused(
+        run_here("run", f"ros2:{domain - 110}"),  # another domain: each is configured once
+        f"domain {domain - 110} cannot be joined",
+        "correct the configuration that CYCLONEDDS_URI names (nowhere.xml), or unset it",
+    )
+    monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", "nowhere.json5")
+    _refused(
+        run_here("run", "zenoh:"),
+        "ZENOH_SESSION_CONFIG_URI, nowhere.json5: No such file",
+        "correct it, or unset the variable",
+    )
+
+
 def test_nobody_in_the_domain(run_here: CommandLine, domain: int) -> None:
     _refused(
         run_here("run", f"ros2:{domain}", "--sensor", "stereo"),
