@@ -116,3 +116,13 @@ def test_too_few_views(found: BoardViews) -> None:
 def test_bad_boards(text: str) -> None:
     with pytest.raises(SettingsError, match="inner corners"):
         Board.parse(text, 0.025)
+
+
+def test_corners_have_the_same_numbers_from_both_sides() -> None:
+    """The second camera of a pair may see the board upside down."""
+    image = chessboards.render(chessboards.poses(6)[5])
+    upright, turned = BOARD.find(image), BOARD.find(np.ascontiguousarray(image[::-1, ::-1]))
+    assert upright is not None
+    assert turned is not None
+    middle = np.array(chessboards.SIZE) - 1
+    np.testing.assert_allclose(turned.pixels, middle - upright.pixels, atol=0.05)
