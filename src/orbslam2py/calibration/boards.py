@@ -193,6 +193,7 @@ class AprilGrid:
     first: int = 0
 
     def __post_init__(self) -> None:
+        _require_tags()
         _check_grid(self.columns, self.rows, "tags", 1)
         _check_length(self.tag, "the side of a tag")
         what = "the gap between tags by the side of a tag, such as 0.3"
@@ -314,12 +315,22 @@ def _spread_in_plane(points: FloatArray) -> bool:
     return bool(values[1] > 0.05 * values[0])
 
 
+def _require_tags() -> None:
+    """Raise `SettingsError` unless OpenCV finds boards with tags."""
+    if not hasattr(getattr(cv2, "aruco", None), "CharucoDetector"):
+        raise SettingsError(
+            f"OpenCV {cv2.__version__} cannot find boards with tags; install 4.8 or later (pip "
+            "install --upgrade opencv-python-headless), or use a chessboard"
+        )
+
+
 def dictionary_names() -> list[str]:
     """Names of the dictionaries of markers, without ``DICT_``."""
     return [name[5:] for name in dir(cv2.aruco) if name.startswith("DICT_")]
 
 
 def _dictionary(name: str) -> cv2.aruco.Dictionary:
+    _require_tags()
     plain = str(name).upper().removeprefix("DICT_")
     names = {known.upper(): known for known in dictionary_names()}
     if plain not in names:

@@ -274,7 +274,7 @@ class Calibration:
         )
         first, rest = settings.to_yaml().split("\n", 1)
         note = (
-            f"# Calibrated from {len(self.views)} views of a {self.board} board, reprojection "
+            f"# Calibrated from {len(self.views)} views of the board {self.board}, reprojection "
             f"error {self.rms:.3f} pixels (RMS)"
         )
         with atomic_write(path) as stream:

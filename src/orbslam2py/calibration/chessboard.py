@@ -102,7 +102,26 @@ class Board:
     def find(self, image: ByteArray) -> BoardCorners | None:
         """Find all corners in a grey image uint8 (h, w); None if not all are seen."""
         corners = find_board(image, self)
-        return None if corners is None else BoardCorners(np.arange(len(corners)), corners)
+        if corners is None:
+            return None
+        if self._is_turned(image, corners):
+            corners = corners[::-1].copy()
+        return BoardCorners(np.arange(len(corners)), corners)
+
+    def _is_turned(self, image: ByteArray, corners: FloatArray) -> bool:
+        """Whether the corners begin at the other end, which the colours of the squares tell.
+
+        Several cameras must call a corner the same; a board with two even or two odd numbers of
+        corners looks the same from both ends.
+        """
+        if (self.columns + self.rows) % 2 == 0:
+            return False
+        grid = corners.reshape(self.rows, self.columns, 2)
+        middles = (grid[:-1, :-1] + grid[1:, 1:] + grid[:-1, 1:] + grid[1:, :-1]) / 4
+        u, v = np.rint(middles).astype(int).reshape(-1, 2).T
+        levels = image[v, u].reshape(middles.shape[:2]).astype(np.float64)
+        even = np.indices(levels.shape).sum(axis=0) % 2 == 0
+        return bool(levels[even].mean() > levels[~even].mean())
 
     def __str__(self) -> str:
         return f"{self.columns}x{self.rows}"

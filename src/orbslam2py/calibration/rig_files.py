@@ -60,7 +60,7 @@ def pair_settings_text(rig: RigCalibration, *, fps: float, n_features: int | Non
     features = usual_n_features(width, height) if n_features is None else n_features
     lines = [
         "%YAML:1.0",
-        f"# Calibrated from {rig.n_moments} sets of images of a {rig.cameras[0].board} board, "
+        f"# Calibrated from {rig.n_moments} sets of images of the board {rig.cameras[0].board}, "
         f"reprojection error {rig.rms:.3f} pixels (RMS)",
         "",
         'File.version: "1.0"',

@@ -148,6 +148,7 @@ def calibrate(
     family = wanted_family(model, k3=k3)
     if camchain is not None or len(sources) > 2:
         check_camchain(family or "radtan4")
+    _refuse_twice(sources)
     target = parse_board(board, square, marker=marker, dictionary=dictionary, spacing=spacing)
     images = [path for source in sources for path in source.glob("*") if _is_image(path)]
     check_apart({"--output": output, "--plot": plot, "--camchain": camchain}, [*sources, *images])
@@ -199,6 +200,16 @@ def _sensor_of(sources: list[Path], sensor: Sensor | None) -> Sensor:
             "them, or leave --sensor out to calibrate them together"
         )
     return sensor
+
+
+def _refuse_twice(sources: list[Path]) -> None:
+    seen: set[Path] = set()
+    for source in sources:
+        if source.resolve() in seen:
+            raise SettingsError(
+                f"{source} is given twice; give the folder or video of each camera once"
+            )
+        seen.add(source.resolve())
 
 
 def _refuse_camchain(camchain: Path | None) -> None:

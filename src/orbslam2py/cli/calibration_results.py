@@ -45,7 +45,7 @@ def print_results(
 
 def table_of_scores(scores: Sequence[FamilyScore]) -> Table:
     """Errors of the lens models that were compared."""
-    table = Table(title="Lens models: reprojection error (RMS) [pixels]")
+    table = Table(title=escape("Lens models: reprojection error (RMS) [pixels]"))
     for name in ("model", "parameters", "all views", "views left out", ""):
         table.add_column(name, justify="left" if name in ("model", "") else "right")
     for score in sorted(scores, key=lambda one: (one.validated, one.rms)):
@@ -67,9 +67,12 @@ def table_of_camera(result: Calibration, source: Path) -> Table:
     table.add_row("views used, left out", f"{len(result.views)}, {len(result.left_out)}")
     table.add_row("image size", f"{width} x {height}")
     table.add_row("image covered", f"{result.coverage:.0%}")
-    table.add_row("corners up to this angle from the axis", f"{np.degrees(result.angle_seen):.0f}")
-    table.add_row("distance of the board [m]", f"{nearest:.2f} to {farthest:.2f}")
-    table.add_row("reprojection error (RMS) [pixels]", f"{result.rms:.3f}")
+    table.add_row(
+        escape("largest angle of a corner from the axis [degrees]"),
+        f"{np.degrees(result.angle_seen):.0f}",
+    )
+    table.add_row(escape("distance of the board [m]"), f"{nearest:.2f} to {farthest:.2f}")
+    table.add_row(escape("reprojection error (RMS) [pixels]"), f"{result.rms:.3f}")
     table.add_section()
     table.add_row("lens model", result.family)
     names = result.camera.parameter_names

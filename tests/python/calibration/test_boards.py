@@ -98,3 +98,11 @@ def test_wrong_boards(tmp_path: Path) -> None:
         AprilGrid(6, 6, 0.05, first=580)
     with pytest.raises(SettingsError, match=r"the side of a tag is 880 m; give metres"):
         AprilGrid(6, 6, 880)
+
+
+def test_an_opencv_without_tags_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr("cv2.aruco.CharucoDetector")
+    for make in (lambda: CharucoBoard(6, 5, 0.04, 0.029), lambda: AprilGrid(6, 6, 0.05)):
+        with pytest.raises(SettingsError, match=r"install 4\.8 or later .* or use a chessboard"):
+            make()
+    assert parse_board("9x6", 0.025) == Board(9, 6, 0.025)

@@ -15,6 +15,7 @@ import pytest
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.maps import MapContents, SavedMap
+from orbslam2py.maps.content_groups import LENS_SIZE, model_number_of
 from orbslam2py.trajectory import read_euroc, read_kitti, read_tum
 from support.command_line import CommandLine
 from support.made_up_map import HEIGHT, LENS, WIDTH, made_up_map
@@ -155,3 +156,31 @@ def test_nothing_is_replaced_without_force(command: CommandLine, tmp_path: Path)
         assert name in done.err
         assert "--force" in done.err
         assert command("map", "export", name, file, name, "--force", "--quiet").code == 0
+
+
+@pytest.mark.parametrize("more", [(), ("--field", "70")])
+def test_a_lens_that_nerfstudio_does_not_know(
+    command: CommandLine, tmp_path: Path, more: tuple[str, ...]
+) -> None:
+    contents = made_up_map()
+    lens = np.zeros((1, LENS_SIZE))
+    lens[0, :6] = (150.0, 150.0, WIDTH / 2, HEIGHT / 2, -0.2, 0.6)
+    cameras = replace(
+        contents.cameras, model=np.array([model_number_of("double_sphere")]), lens=lens
+    )
+    saved = made_up_saved(replace(contents, cameras=cameras))
+    file = map_file(tmp_path, saved)
+    write_sequence(tmp_path / "walk", contents)
+    line = ("map", "export", "nerfstudio", file, "out")
+    done = command(*line, "--images", "walk", "--times", "times.txt", *more)
+    assert done.code == 0, done.err
+    told = " ".join(done.err.split())
+    assert "lens of the model double_sphere, which the format cannot hold" in told
+    data = json.loads(Path("out/transforms.json").read_text())
+    assert (data["camera_model"], data["k1"], data["w"]) == ("OPENCV", 0, WIDTH)
+    wide = np.degrees(2 * np.arctan(WIDTH / 2 / data["fl_x"]))
+    assert wide == pytest.approx(70) if more else 70 < wide <= 120
+    assert data["cx"] == WIDTH / 2
+    without = command(*line[:-1], "other", "--without-images")
+    assert without.code == 2
+    assert "give the images (--images" in without.err

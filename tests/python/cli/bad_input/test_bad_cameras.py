@@ -37,10 +37,13 @@ def expect_told(done: Outcome, *messages: str) -> None:
         ((*NEW, "--sensor", "mono", "--size", "640"), ("--size is '640'", "like 640x480")),
         ((*NEW, "--sensor", "mono", "--size", "0x480"), ("Camera.width is 0", "1 to 65535")),
         ((*NEW, "--sensor", "mono", "--distortion", "1,2"), ("'1,2'", "k1,k2,p1,p2")),
-        ((*NEW, "--sensor", "mono", "--distortion", "1,2,3,4,5,6"), ("'1,2,3,4,5,6'", "or eight")),
+        (
+            (*NEW, "--sensor", "mono", "--distortion", "1,2,3,4,5,6"),
+            ("'1,2,3,4,5,6'", "eight or twelve"),
+        ),
         (
             (*NEW, "--sensor", "mono", "--distortion", "a,b,c,d"),
-            ("'a,b,c,d'", "four, five or eight"),
+            ("'a,b,c,d'", "four, five, eight or twelve"),
         ),
         ((*NEW, "--sensor", "mono", "--features", "0"), ("nFeatures is 0", "usual: 1000")),
         (
