@@ -76,7 +76,7 @@ def benchmark(
     Parameters
     ----------
     kind
-        ``tum``, ``kitti`` or ``euroc``.
+        ``tum``, ``kitti``, ``euroc`` or ``tum-vi``.
     root
         Folder that holds sequences, also in folders below it.
     output
