@@ -186,6 +186,12 @@ READABLE_SAMPLES = (
         "walk.mp4  walk.imu.csv",
     ),
     ReadableImu(
+        "two tables",
+        "One of the gyro and one of the accelerometer, as apps of phones write them: "
+        "`--imu-samples` twice.",
+        "Gyroscope.csv: time,seconds_elapsed,z,y,x",
+    ),
+    ReadableImu(
         "GoPro",
         "The track GPMF of the MP4 file; axes in the order that `ORIN` tells.",
         "GX010001.MP4",
