@@ -12,7 +12,11 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from orbslam2py.datasets.readable import READABLE_LAYOUTS
+from orbslam2py.datasets.readable import (
+    READABLE_IMU_SETTINGS,
+    READABLE_LAYOUTS,
+    READABLE_SAMPLES,
+)
 from orbslam2py.settings.foreign import FORMATS
 from orbslam2py.trajectory.layouts import TRAJECTORY_LAYOUTS
 
@@ -32,7 +36,8 @@ _PAIRS = {
 
 def reference() -> str:
     """Return the page."""
-    return _HEAD + "\n\n".join([_layouts(), _calibrations(), _settings(), _trajectories()]) + "\n"
+    parts = [_layouts(), _imus(), _calibrations(), _settings(), _trajectories()]
+    return _HEAD + "\n\n".join(parts) + "\n"
 
 
 def _layouts() -> str:
@@ -45,6 +50,22 @@ def _layouts() -> str:
         + _table(head, rows)
         + "\n\nA package can add a layout of its own: "
         "[Your own data set](../guide/own-dataset.md)."
+    )
+
+
+def _imus() -> str:
+    samples, settings = (
+        _table(("from", "what is read", "example"), rows)
+        for rows in (
+            [(one.name, one.description, _code(one.example)) for one in readable]
+            for readable in (READABLE_SAMPLES, READABLE_IMU_SETTINGS)
+        )
+    )
+    return (
+        "## IMUs\n\nSamples come with the images: [Add an IMU](../guide/imu.md).\n\n"
+        + samples
+        + "\n\n`--imu-settings FILE` and `read_imu_settings` recognise the settings by their "
+        "content.\n\n" + settings
     )
 
 

@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from orbslam2py._figures import check_picture_name
 from orbslam2py.cli.exit_codes import ExitCode
-from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_table
+from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_tables
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.run_options import (
     AccelUnitOption,
@@ -61,12 +61,12 @@ def check(
     imu_settings: ImuSettingsOption = None,
     imu_chip: ImuNoiseOption = None,
     imu: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "--imu-samples",
             "--imu",
-            help="Table with the samples: time, gyro x y z, accelerometer x y z [those of the "
-            "recording].",
+            help="Table with the samples: time, gyro x y z, accelerometer x y z; twice for one of "
+            "the gyro and one of the accelerometer [those of the recording].",
             metavar="FILE",
         ),
     ] = None,
@@ -97,14 +97,14 @@ def check(
     check_units(imu, gyro_unit, accel_unit)
     if plot is not None:
         check_picture_name(plot, "--plot")
-        check_apart({"--plot": plot}, [] if imu is None else [imu])
+        check_apart({"--plot": plot}, imu or [])
     check_target(plot, force=force)
     images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, topics=topics)
     if not isinstance(images, FramesInOrder):
         raise DatasetError(
             f"{sequence} is a camera, whose IMU is not read; record it first, and check that"
         )
-    given = read_table(imu, gyro_unit, accel_unit)
+    given = read_tables(imu, gyro_unit, accel_unit)
     samples = imu_of(images) if given is None else given
     if samples is None:
         raise DatasetError(

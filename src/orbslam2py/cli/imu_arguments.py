@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orbslam2py.datasets import AccelUnit, GyroUnit, ImuSamples, read_imu_csv
+from orbslam2py.datasets import AccelUnit, GyroUnit, ImuSamples, read_imu_csv, read_imu_streams
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import ImuSettings, imu_noise, read_imu_settings
 from orbslam2py.settings.imu_files import imu_of_settings_file
@@ -37,26 +37,32 @@ def imu_settings_given(
 
 
 def check_units(
-    table: Path | None, gyro_unit: GyroUnit | None, accel_unit: AccelUnit | None
+    tables: list[Path] | None, gyro_unit: GyroUnit | None, accel_unit: AccelUnit | None
 ) -> None:
-    """See that units are given for a table only.
+    """See that units are given for tables only, and at most two of these.
 
     Raises
     ------
     SettingsError
-        If there is none.
+        If there is none, or one too many.
     """
-    if table is None and (gyro_unit or accel_unit):
+    if not tables and (gyro_unit or accel_unit):
         raise SettingsError(
             "--gyro-unit and --accel-unit are for the table of --imu-samples; give it, or leave "
             "them out"
         )
+    if len(tables or ()) > 2:
+        raise SettingsError(
+            f"--imu-samples is given {len(tables or ())} times; give one table, or one of the gyro "
+            "and one of the accelerometer"
+        )
 
 
-def read_table(
-    table: Path | None, gyro_unit: GyroUnit | None, accel_unit: AccelUnit | None
+def read_tables(
+    tables: list[Path] | None, gyro_unit: GyroUnit | None, accel_unit: AccelUnit | None
 ) -> ImuSamples | None:
-    """Read the table of ``--imu-samples``; None if none was given."""
-    if table is None:
+    """Read the tables of ``--imu-samples``; None if none was given."""
+    if not tables:
         return None
-    return read_imu_csv(table, gyro_unit=gyro_unit, accel_unit=accel_unit)
+    read = read_imu_csv if len(tables) == 1 else read_imu_streams
+    return read(*tables, gyro_unit=gyro_unit, accel_unit=accel_unit)

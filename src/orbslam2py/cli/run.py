@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
-from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_table
+from orbslam2py.cli.imu_arguments import check_units, imu_settings_given, read_tables
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.publishing import (
     MCAP,
@@ -243,7 +243,7 @@ def run(
         imu_settings=(
             None if imu is False else imu_settings_given(settings, imu_settings, imu_noise)
         ),
-        imu_samples=read_table(imu_samples, gyro_unit, accel_unit),
+        imu_samples=read_tables(imu_samples, gyro_unit, accel_unit),
     )
     code = run_and_show(
         images,
@@ -260,7 +260,8 @@ def run(
         inputs=[
             Path(given)
             for given in (
-                *(sequence, settings, times, mask, vocabulary, imu_samples),
+                *(sequence, settings, times, mask, vocabulary),
+                *(imu_samples or ()),
                 *(imu_settings or ()),
             )
             if given

@@ -122,10 +122,11 @@ AccelUnitOption = Annotated[
     typer.Option(help="Unit of the accelerometer in that table [its header, or m/s^2]."),
 ]
 ImuSamplesOption = Annotated[
-    Path | None,
+    list[Path] | None,
     typer.Option(
-        help="Table with the samples of the IMU: time, gyro x y z, accelerometer x y z [those of "
-        "the recording].",
+        "--imu-samples",
+        help="Table with the samples of the IMU: time, gyro x y z, accelerometer x y z; twice for "
+        "one of the gyro and one of the accelerometer [those of the recording].",
         metavar="FILE",
     ),
 ]

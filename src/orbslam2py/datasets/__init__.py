@@ -25,6 +25,7 @@ from orbslam2py.datasets.gopro import read_gopro_imu
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.imu import ImuSamples, imu_of, imu_settings_of
 from orbslam2py.datasets.imu_csv import AccelUnit, GyroUnit, read_imu_csv
+from orbslam2py.datasets.imu_streams import read_imu_streams
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.layouts import (
     BonnSequence,
@@ -83,6 +84,7 @@ __all__ = [
     "open_sequence",
     "read_gopro_imu",
     "read_imu_csv",
+    "read_imu_streams",
     "recognise",
 ]
 

@@ -154,6 +154,8 @@ class EurocSequence(RecordedSequence):
         """
         path = self._root / "state_groundtruth_estimate0" / "data.csv"
         if not path.is_file():
+            path = self._root / "mocap0" / "data.csv"  # TUM-VI: of the IMU, which is the body
+        if not path.is_file():
             return None
         calibration = self._root / "cam0" / "sensor.yaml"
         if not calibration.is_file():

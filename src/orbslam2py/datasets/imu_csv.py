@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -68,6 +69,9 @@ _LONGEST_STEP, _SHORTEST_STEP = 0.11, 1e-4
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
+_Unit = TypeVar("_Unit", GyroUnit, AccelUnit)
+
+
 @dataclass(frozen=True)
 class _Columns:
     """Places of time, gyro and accelerometer, and the units that the header tells."""
@@ -75,6 +79,83 @@ class _Columns:
     places: tuple[int, ...]
     gyro: GyroUnit | None = None
     accel: AccelUnit | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of numbers with its header.
+
+    Attributes
+    ----------
+    path
+        The file.
+    header
+        The line that names the columns; empty if there is none.
+    lines
+        Numbers and texts of the other lines.
+    """
+
+    path: Path
+    header: str
+    lines: list[tuple[int, str]]
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of the columns."""
+        return _fields(self.header, header=True)
+
+    def numbers(self, places: tuple[int, ...]) -> FloatArray:
+        """Take columns, (n, k).
+
+        Raises
+        ------
+        DatasetError
+            Naming the line that has no numbers there.
+        """
+        data = np.empty((len(self.lines), len(places)))
+        for row, (number, line) in enumerate(self.lines):
+            fields = _fields(line)
+            try:
+                data[row] = [float(fields[place].strip('"') or "nan") for place in places]
+            except (IndexError, ValueError):
+                count = {4: "three", 7: "six"}.get(len(places), str(len(places) - 1))
+                raise DatasetError(
+                    f"{self.path}:{number}: '{line[:80]}' is no sample of the IMU: it needs a time "
+                    f"and {count} numbers; correct the line or take it away"
+                ) from None
+        return data
+
+
+def read_table(path: Path, columns: int = 7) -> Table:
+    """Read a table of samples; a line that names at least this number of columns is its header.
+
+    Raises
+    ------
+    DatasetError
+        If the file cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise DatasetError(cannot_open(path, error)) from error
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
+    content = [(number, line) for number, line in lines if line.strip("\ufeff#,; \t")]
+    header = ""
+    while content and not _is_number(_fields(content[0][1])[0]):
+        # Of several lines of comment the last with enough columns names them.
+        named = content.pop(0)[1].lstrip("\ufeff# \t")
+        header = named if len(_fields(named, header=True)) >= columns else header
+    return Table(path, header, content)
+
+
+def unit_in(header: str, kind: type[_Unit]) -> _Unit | None:
+    """Tell the unit that stands in brackets in a header, if it is not the usual one."""
+    units = [match["unit"] for match in _UNIT.finditer(header)]
+    if kind is GyroUnit and any(_DEGREES.search(unit) for unit in units):
+        return kind("deg/s")
+    if kind is AccelUnit and any(_GRAVITIES.fullmatch(unit) for unit in units):
+        return kind("g")
+    return None
 
 
 def read_imu_csv(
@@ -101,20 +182,10 @@ def read_imu_csv(
         Naming the file, the line and what is wrong there.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise DatasetError(cannot_open(path, error)) from error
-    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
-    content = [(number, line) for number, line in lines if line.strip("\ufeff#,; \t")]
-    header = ""
-    while content and not _is_number(_fields(content[0][1])[0]):
-        # Of several lines of comment the last with enough columns names them.
-        named = content.pop(0)[1].lstrip("\ufeff# \t")
-        header = named if len(_fields(named, header=True)) >= 7 else header
-    columns = _columns_of(path, header) if header else _Columns(tuple(range(7)))
-    data = _numbers(path, content, columns.places)
-    data[:, 0] *= _time_unit(path, data[:, 0])
+    table = read_table(path)
+    columns = _columns_of(path, table.header) if table.header else _Columns(tuple(range(7)))
+    data = table.numbers(columns.places)
+    data[:, 0] *= time_unit(path, data[:, 0])
     data[:, 1:4] *= GyroUnit(gyro_unit or columns.gyro or GyroUnit.RADIANS).factor
     data[:, 4:] *= AccelUnit(accel_unit or columns.accel or AccelUnit.METRES).factor
     return make_samples(str(path), data)
@@ -188,21 +259,7 @@ def _columns_of(path: Path, header: str) -> _Columns:
     )
 
 
-def _numbers(path: Path, content: list[tuple[int, str]], places: tuple[int, ...]) -> FloatArray:
-    data = np.empty((len(content), 7))
-    for row, (number, line) in enumerate(content):
-        fields = _fields(line)
-        try:
-            data[row] = [float(fields[place] or "nan") for place in places]
-        except (IndexError, ValueError):
-            raise DatasetError(
-                f"{path}:{number}: '{line[:80]}' is no sample of the IMU: it needs a time and six "
-                "numbers; correct the line or take it away"
-            ) from None
-    return data
-
-
-def _time_unit(path: Path, times: FloatArray) -> float:
+def time_unit(path: Path, times: FloatArray) -> float:
     """Seconds per unit of the times, by the usual step between them."""
     steps = np.abs(np.diff(times[np.isfinite(times)]))
     steps = steps[steps > 0]

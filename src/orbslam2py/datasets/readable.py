@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The layouts of images that can be read, with examples; the documentation is generated from it."""
+"""The images and IMU samples that can be read, with examples; the documentation is made of it."""
 
 from __future__ import annotations
 
@@ -145,5 +145,94 @@ READABLE_LAYOUTS = (
     ReadableLayout("video", "mono", "What OpenCV decodes.", "drive.mp4"),
     ReadableLayout(
         "camera", "mono", "The number of a camera that is plugged in.", "orbslam2py run 0 ..."
+    ),
+)
+
+
+@dataclass(frozen=True)
+class ReadableImu:
+    """Samples of an IMU, or settings of one.
+
+    Attributes
+    ----------
+    name
+        Whose they are.
+    description
+        What is read.
+    example
+        Files or lines of it.
+    """
+
+    name: str
+    description: str
+    example: str
+
+
+#: Samples of IMUs.
+READABLE_SAMPLES = (
+    ReadableImu(
+        "EuRoC, TUM-VI",
+        "Time in ns, gyro, accelerometer.",
+        "mav0/imu0/data.csv: 1403636579758555392,-0.0991,0.1473,0.0272,8.1477,-0.3759,-2.4026",
+    ),
+    ReadableImu(
+        "table beside the images",
+        "A header names the columns, with units in brackets; times in s, ms, us or ns.",
+        "imu.csv: timestamp [s],gyro_x [deg/s],gyro_y,gyro_z,accel_x [g],accel_y,accel_z",
+    ),
+    ReadableImu(
+        "table beside a video",
+        "The same, in `VIDEO.imu.csv` or `imu.csv`; anywhere else with `--imu-samples`.",
+        "walk.mp4  walk.imu.csv",
+    ),
+    ReadableImu(
+        "two tables",
+        "One of the gyro and one of the accelerometer, as apps of phones write them: "
+        "`--imu-samples` twice.",
+        "Gyroscope.csv: time,seconds_elapsed,z,y,x",
+    ),
+    ReadableImu(
+        "GoPro",
+        "The track GPMF of the MP4 file; axes in the order that `ORIN` tells.",
+        "GX010001.MP4",
+    ),
+    ReadableImu(
+        "KITTI raw",
+        "Accelerations and angular rates of `oxts`.",
+        "oxts/timestamps.txt  oxts/data/0000000000.txt",
+    ),
+    ReadableImu(
+        "OpenLORIS-Scene",
+        "Gyro and accelerometer of the camera.",
+        "d400_gyroscope.txt  d400_accelerometer.txt",
+    ),
+    ReadableImu(
+        "bags",
+        "The topic of the type Imu, or two of them named gyro and accel.",
+        "drive.bag with /imu0 (sensor_msgs/Imu)",
+    ),
+)
+
+#: Files that describe an IMU.
+READABLE_IMU_SETTINGS = (
+    ReadableImu(
+        "ORB-SLAM3",
+        "Noise, rate, and the matrix from camera to IMU; also inside the settings of the camera.",
+        "IMU.NoiseGyro: 1.7e-4\nIMU.T_b_c1: !!opencv-matrix",
+    ),
+    ReadableImu(
+        "Kalibr",
+        "`imu.yaml` and the camchain with `T_cam_imu` and `timeshift_cam_imu`: two files.",
+        "gyroscope_noise_density: 0.0019\ncam0: T_cam_imu: [[0.0, -1.0, 0.0, 0.05], ...]",
+    ),
+    ReadableImu(
+        "EuRoC",
+        "`sensor.yaml` of the IMU and of the camera: two files, or their folder.",
+        "mav0/imu0/sensor.yaml  mav0/cam0/sensor.yaml",
+    ),
+    ReadableImu(
+        "Basalt",
+        "The calibration as JSON.",
+        '{"value0": {"T_imu_cam": [{"px": 0.05, "py": 0.0, ...}], "gyro_noise_std": [...]}}',
     ),
 )

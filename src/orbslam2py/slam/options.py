@@ -146,9 +146,9 @@ class Setup:
             settings = loaded.settings
         if loaded is not None:
             check_sensor(loaded, sensor)
-        if imu is None and not isinstance(settings, Settings):
-            imu = imu_of_settings_file(Path(settings))
-        settings = resolve_settings(settings, sensor)
+        given, settings = settings, resolve_settings(settings, sensor)
+        if imu is None and not isinstance(given, Settings):
+            imu = imu_of_settings_file(Path(given))
         words = (
             vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
         )

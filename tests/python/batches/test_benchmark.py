@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orbslam2py.batches import BenchmarkResult, StandardSet, benchmark
@@ -16,6 +17,8 @@ from orbslam2py.batches.standard_sets.entries import Entry, is_lost
 from orbslam2py.batches.standard_sets.find import find_sequences
 from orbslam2py.batches.standard_sets.markdown import markdown_table
 from orbslam2py.batches.standard_sets.published import published_figures
+from orbslam2py.datasets import open_sequence
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.browser import Browser
 from support.command_line import logging_restored
 from support.data import shared_folder
@@ -145,6 +148,10 @@ def test_published_names() -> None:
     (with_imu,) = published_figures("euroc", "V2_03_difficult", "mono", imu=True)
     assert (with_imu.system, with_imu.ate_rmse_m) == ("ORB-SLAM3", 0.027)
     assert published_figures("kitti", "00", "stereo", imu=True) == []
+    (room,) = published_figures("tum-vi", "dataset-room2_512_16", "stereo", imu=True)
+    assert room.ate_rmse_m == 0.012
+    (outdoors,) = published_figures("tum-vi", "outdoors7", "mono", imu=True)
+    assert outdoors.ate_rmse_m == 7.6
     (desk,) = published_figures("tum", "freiburg1_desk", "rgbd")
     assert desk.ate_rmse_m == 0.016
     assert re.search(r"2017.*Table III", desk.source)
@@ -241,3 +248,16 @@ def test_real_pieces(kind: str, name: str, sensor: str, tmp_path: Path) -> None:
     spread = entry.spread("ate_rmse_m")
     assert spread is not None
     assert spread.median < 0.3
+
+
+def test_tum_vi_is_told_from_euroc(tmp_path: Path) -> None:
+    options = SyntheticOptions(world="room", sensor="stereo", frames=3, size=(320, 240), imu=True)
+    for name in ("MH_01_easy", "dataset-room1_512_16"):
+        SyntheticSequence(options).write(tmp_path / name)
+    there = tmp_path / "dataset-room1_512_16" / "mav0"
+    (there / "state_groundtruth_estimate0").rename(there / "mocap0")
+    assert list(find_sequences("euroc", tmp_path)) == ["MH_01_easy"]
+    assert list(find_sequences("tum-vi", tmp_path)) == ["dataset-room1_512_16"]
+    path, same = (open_sequence(folder).ground_truth() for folder in tmp_path.iterdir())
+    assert path is not None and same is not None
+    np.testing.assert_array_equal(path.T_wc, same.T_wc)

@@ -88,6 +88,13 @@ WRONG = {
         "--no-imu leaves the IMU out",
         "leave out one",
     ),
+    "three tables": (3 * ["--imu-samples", "made/imu.csv"], [], "--imu-samples is given 3", "one"),
+    "two of one": (
+        2 * ["--imu-samples", "made/imu.csv"],
+        [],
+        "neither its header nor its name tells",
+        "name the file gyro.csv or accelerometer.csv",
+    ),
     "wrong unit": (
         ["--imu-samples", "made/imu.csv", "--gyro-unit", "rpm"],
         [],

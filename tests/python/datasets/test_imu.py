@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError
-from orbslam2py.datasets import imu_of, open_sequence, read_imu_csv
+from orbslam2py.datasets import imu_of, open_sequence, read_imu_csv, read_imu_streams
 from orbslam2py.datasets.imu import joined_streams
 from orbslam2py.datasets.imu_csv import read_stream
 from orbslam2py.datasets.layouts.kitti_raw_poses import read_oxts_imu
@@ -155,3 +155,73 @@ def test_euroc(shared_data):
     assert samples.gyro.mean(axis=0) == pytest.approx([-0.003, 0.021, 0.077], abs=4e-3)
     assert np.linalg.norm(samples.accel.mean(axis=0)) == pytest.approx(9.8, abs=0.05)
     assert sequence.imu_settings().T_ci[0, 1] == pytest.approx(0.999557, abs=1e-6)
+
+
+PHONES = {
+    "Sensor Logger": (
+        "time,seconds_elapsed,z,y,x",
+        1e9,
+        (3, 2, 1),
+        "Gyroscope",
+        "TotalAcceleration",
+    ),
+    "Phyphox": (
+        '"Time (s)","{} x ({})","{} y ({})","{} z ({})"',
+        1.0,
+        (1, 2, 3),
+        "Raw",
+        "Data",
+    ),
+}
+
+
+@pytest.mark.parametrize("app", PHONES)
+def test_two_tables_of_a_phone(tmp_path, app):
+    header, per_second, order, gyro_name, accel_name = PHONES[app]
+    t, t_a = np.arange(0, 2, 0.01), np.arange(0.003, 1.99, 0.02)
+    gyro = np.column_stack([t, 0.1 * t, 0.2 * t, 0.3 * t])
+    accel = np.column_stack([t_a, 1 + t_a, 2 + t_a, 9 + t_a])
+    for name, rows, what, unit in (
+        (gyro_name, gyro, "Gyroscope", "rad/s"),
+        (accel_name, accel, "Acceleration", "m/s^2"),
+    ):
+        lines = [header.replace("{} ", what + " ").replace("{}", unit)]
+        for row in rows:
+            stamp = int((1.7e9 + row[0]) * 1e9) if per_second > 1 else float(row[0])
+            elapsed = [float(row[0])] if per_second > 1 else []
+            lines.append(",".join(map(repr, [stamp, *elapsed, *row[list(order)].tolist()])))
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines) + "\n")
+    for names in ((gyro_name, accel_name), (accel_name, gyro_name)):
+        samples = read_imu_streams(*(tmp_path / f"{name}.csv" for name in names))
+        start = 1.7e9 if per_second > 1 else 0.0
+        at = samples.timestamps - start
+        assert len(samples) == 198
+        np.testing.assert_allclose(samples.gyro, np.outer(at, [0.1, 0.2, 0.3]), atol=1e-6)
+        np.testing.assert_allclose(samples.accel, at[:, None] + [1, 2, 9], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "headers", "message"),
+    [
+        (("gyro", "gyro2"), ("t,x,y,z", "t,x,y,z"), "both tables of the gyro"),
+        (("a", "accel"), ("t,x,y,z", "t,x,y,z"), "neither its header nor its name tells"),
+        (("gyro", "accel"), ("t,x,y,z", "t,x,y,w"), "names no column z"),
+        (("gyro", "accel"), ("a,x,y,z", "t,x,y,z"), "names no column time"),
+        (("gyro", "accel"), ("", "t,x,y,z"), "names no column time, x, y, z"),
+    ],
+)
+def test_two_tables_that_do_not_fit(tmp_path, names, headers, message):
+    for name, header in zip(names, headers, strict=True):
+        rows = "".join(f"{0.01 * k},1,2,3\n" for k in range(5))
+        (tmp_path / f"{name}.csv").write_text(f"{header}\n{rows}")
+    with pytest.raises(DatasetError, match=message):
+        read_imu_streams(*(tmp_path / f"{name}.csv" for name in names))
+
+
+def test_units_in_two_tables(tmp_path):
+    rows = "".join(f"{0.01 * k},90,0,1\n" for k in range(5))
+    (tmp_path / "gyro.csv").write_text(f"t,x [deg/s],y,z\n{rows}")
+    (tmp_path / "accel.csv").write_text(f"t,x [g],y,z\n{rows}")
+    samples = read_imu_streams(tmp_path / "gyro.csv", tmp_path / "accel.csv")
+    assert samples.gyro[0].tolist() == pytest.approx([np.pi / 2, 0, np.pi / 180])
+    assert samples.accel[0, 2] == pytest.approx(9.80665)

@@ -18,9 +18,13 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 
+import numpy as np
+
 from orbslam2py import Callbacks, Sensor, StateError, System, load_vocabulary
 from orbslam2py.datasets import Images
+from orbslam2py.settings import ImuSettings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic.imu import T_CI
 from support.watchdog import watchdog, worker_threads
 
 SECONDS = float(os.environ.get("ORBSLAM2PY_STRESS_SECONDS", "8"))
@@ -77,6 +81,7 @@ class Session:
         self._patience = patience
         self._counts = counts
         self._done = threading.Event()
+        self._now = 0.0
         self.errors: list[BaseException] = []
         self.system = System(
             sequence().settings,
@@ -84,11 +89,12 @@ class Session:
             load_vocabulary(None),
             wait_for_mapping=True,
             seed=seed,
+            imu=ImuSettings(2e-4, 2e-3, 2e-5, 1e-3, T_ci=T_CI),
             callbacks=Callbacks(on_keyframe=self._look, on_map_change=self._count_change),
         )
 
     def run(self, seconds: float, *, drain: bool) -> None:
-        users = (self._track, self._switch, self._optimize, self._watch)
+        users = (self._track, self._measure, self._switch, self._optimize, self._watch)
         threads = [threading.Thread(target=self._guarded, args=(user,)) for user in users]
         for thread in threads:
             thread.start()
@@ -128,9 +134,30 @@ class Session:
             frame += 1
             shown = images(index % LAP)
             assert shown.depth is not None
+            self._now = float(frame)
             with self._patience("track"):
                 self.system.track_rgbd(shown.image, shown.depth, float(frame))
             self._counts["frames"] += 1
+
+    def _measure(self, rng: random.Random) -> None:
+        """Samples of a still IMU: late, doubled, out of order, not finite, or with gaps."""
+        reached = 0.0
+        while not self._done.wait(rng.uniform(0, 0.05)):
+            until = self._now + rng.uniform(0, 2)
+            t = np.arange(reached - rng.choice([0, 0, 0.5]), until, 0.02)
+            rows = np.column_stack([t, np.full((len(t), 6), [0, 0, 0, 0, 0, 9.81])])
+            fault = rng.randrange(10)
+            if fault == 0:
+                rows = rows[::-1]
+            elif fault == 1:
+                rows[: len(rows) // 2] = np.nan
+            elif fault == 2:
+                rows = rows[len(rows) // 2 :]
+            reached = max(reached, until)
+            with self._patience("samples"):
+                self.system.add_imu(rows)
+            assert self.system.imu_check is not None
+            self._counts[f"IMU {self.system.imu_check.verdict}"] += 1
 
     def _switch(self, rng: random.Random) -> None:
         while not self._done.wait(rng.uniform(0, 0.3)):

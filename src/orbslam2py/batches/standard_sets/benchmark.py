@@ -76,7 +76,7 @@ def benchmark(
     Parameters
     ----------
     kind
-        ``tum``, ``kitti`` or ``euroc``.
+        ``tum``, ``kitti``, ``euroc`` or ``tum-vi``.
     root
         Folder with the sequences, also in its subfolders.
     output

@@ -27,6 +27,8 @@ class StandardSet(str, Enum):
     """KITTI odometry (Geiger et al., CVPR 2012)."""
     EUROC = "euroc"
     """EuRoC MAV (Burri et al., IJRR 2016)."""
+    TUM_VI = "tum-vi"
+    """TUM-VI (Schubert et al., IROS 2018)."""
 
     @classmethod
     def of(cls, value: StandardSet | str) -> StandardSet:
@@ -42,7 +44,12 @@ class StandardSet(str, Enum):
     @property
     def full_name(self) -> str:
         """Its name as its authors write it."""
-        return {"tum": "TUM RGB-D", "kitti": "KITTI odometry", "euroc": "EuRoC MAV"}[self.value]
+        return {
+            "tum": "TUM RGB-D",
+            "kitti": "KITTI odometry",
+            "euroc": "EuRoC MAV",
+            "tum-vi": "TUM-VI",
+        }[self.value]
 
     @property
     def files(self) -> str:
@@ -51,6 +58,7 @@ class StandardSet(str, Enum):
             "tum": "rgb.txt or associations.txt",
             "kitti": "times.txt with image_0 or image_2",
             "euroc": "mav0/cam0",
+            "tum-vi": "mav0/cam0 and mav0/mocap0",
         }[self.value]
 
     def __str__(self) -> str:
@@ -87,11 +95,11 @@ def find_sequences(kind: StandardSet | str, root: Path) -> dict[str, Path]:
     found: list[Path] = []
     others: Counter[str] = Counter()
     for folder in _sequences(root, _DEPTH, set()):
-        layout = str(recognise(folder))
-        if layout == str(Layout(kind.value)):
+        of = _set_of(folder)
+        if of == kind.value:
             found.append(folder)
         else:
-            others[layout] += 1
+            others[of] += 1
     if not found:
         raise DatasetError(f"{root} holds no sequence of {kind.full_name}{_instead(kind, others)}")
     times = Counter(_name(folder) for folder in found)
@@ -100,6 +108,13 @@ def find_sequences(kind: StandardSet | str, root: Path) -> dict[str, Path]:
         for folder in found
     }
     return dict(sorted(names.items()))
+
+
+def _set_of(folder: Path) -> str:
+    """Name of the data set, or of the layout: TUM-VI has that of EuRoC, and poses in mocap0."""
+    layout = recognise(folder)
+    has_mocap = any((root / "mocap0").is_dir() for root in (folder, folder / "mav0"))
+    return str(StandardSet.TUM_VI if layout is Layout.EUROC and has_mocap else layout)
 
 
 def _sequences(folder: Path, depth: int, seen: set[Path]) -> Iterator[Path]:

@@ -19,6 +19,7 @@ _NAMES = {
     StandardSet.TUM: re.compile(r"(?:rgbd_dataset_)?(freiburg\d_\w+)"),
     StandardSet.KITTI: re.compile(r"(\d\d)"),
     StandardSet.EUROC: re.compile(r"((?:MH|V1|V2)_\d\d)(?:_(?:easy|medium|difficult))?"),
+    StandardSet.TUM_VI: re.compile(r"(?:dataset-)?([a-z]+\d)(?:_(?:512|1024)_16)?"),
 }
 
 

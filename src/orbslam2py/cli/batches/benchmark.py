@@ -31,7 +31,7 @@ from orbslam2py.cli.batches.arguments import (
     WorkersOption,
 )
 from orbslam2py.cli.batches.watched_runs import exit_as_it_ended, watched_runs
-from orbslam2py.cli.run_options import QuietFlag
+from orbslam2py.cli.run_options import ImuFlag, QuietFlag
 from orbslam2py.settings import Sensor
 
 EXAMPLE = """
@@ -62,6 +62,7 @@ def benchmark(
     max_frames: Annotated[
         int | None, typer.Option(help="Most frames of each, for a trial.", min=1)
     ] = None,
+    imu: ImuFlag = None,
     resume: ResumeFlag = False,
     scheduler: SchedulerOption = None,
     workers: WorkersOption = None,
@@ -69,11 +70,13 @@ def benchmark(
     report_pages: ReportPagesFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Run all sequences of TUM RGB-D, KITTI or EuRoC, beside figures of ORB-SLAM2 and 3."""
+    """Run all sequences of TUM RGB-D, KITTI, EuRoC or TUM-VI, beside figures of ORB-SLAM2 and 3."""
     console, errors = Console(quiet=quiet), Console(stderr=True)
     options: dict[str, Any] = {"deterministic": True} if deterministic else {}
     if max_frames is not None:
         options["max_frames"] = max_frames
+    if imu is not None:
+        options["imu"] = imu
     with watched_runs(console, errors) as (progress, watch, stop):
         done = run_benchmark(
             kind,
