@@ -187,8 +187,8 @@ def _found_pair(pair: Pair, size: tuple[int, int], fps: float) -> PairCameras:
         _require_overlap(pair, (left.K, right.K), size, T[:3, :3])
     _require_side_by_side(pair, T)
     try:
-        cameras = (raw_camera(one, fps) for one in (left, right))
-        return cameras_of_pair(*cameras, T, size, key)
+        first, second = (raw_camera(one, fps) for one in (left, right))
+        return cameras_of_pair(first, second, T, size, key)
     except SettingsError as error:
         raise SettingsError(
             f"{pair.where}: the pair cannot be rectified ({error}); look at intrinsics, distortion "
