@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,6 +44,10 @@ class ArrayGroup:
             yield field.name, getattr(self, field.name)
 
 
+#: Where `Cameras.lens` has the centre of the right camera of a fisheye pair.
+RIGHT_CENTRE = slice(13, 16)
+
+
 @dataclass(frozen=True, eq=False)
 class Cameras(ArrayGroup):
     """The cameras that keyframes were seen with: (c,) entries each, one as a rule."""
@@ -70,10 +74,20 @@ class Cameras(ArrayGroup):
     """Of a fisheye lens the place of its camera model in the list of models, from 1 on; 0 of a
     pinhole. `camera_model` gives the model itself."""
     lens: FloatArray
-    """(c, 16) parameters of that model, zeros after the last one."""
+    """(c, 16) parameters of that model, zeros after the last one. The last three are the centre of
+    the right camera of a fisheye pair in the frame of the left one [m], zeros if there is none."""
 
     def __len__(self) -> int:
         return len(self.fx)
+
+    def scaled(self, scale: float) -> Cameras:
+        """Return the cameras with lengths in another unit: one of them is `scale` new ones."""
+        lens = self.lens.copy()
+        # No model of a fisheye pair has so many parameters.
+        parameters = [len(one) for _, _, one in _core.camera_models()]
+        pairs = [n > 0 and parameters[n - 1] <= RIGHT_CENTRE.start for n in self.model.tolist()]
+        lens[pairs, RIGHT_CENTRE] *= scale
+        return replace(self, bf=scale * self.bf, lens=lens)
 
     def camera_model(self, row: int) -> CameraModel | None:
         """Return the model of a fisheye lens, or None for a pinhole."""
