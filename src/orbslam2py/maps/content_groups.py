@@ -171,7 +171,7 @@ class Keyframes(ArrayGroup):
     descriptors: ByteArray
     """(n, 32) ORB."""
     depth: Float32Array
-    """(n,) along the optical axis [m]; -1 unknown."""
+    """(n,) along the optical axis, of a fisheye lens along the ray [m]; -1 unknown."""
     right_u: Float32Array
     """(n,) column in the (virtual) right image [px]; -1 where the depth is unknown."""
     colours: ByteArray
