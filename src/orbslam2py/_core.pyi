@@ -3784,7 +3784,7 @@ def room_T_wc(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3,
     """
     Camera to world (4, 4) of somebody looking around in a room, once in `period` seconds.
     """
-def sample_colours(frame: Frame, image: numpy.ndarray, is_rgb: bool, rectifier: PairRectifier = None) -> None:
+def sample_colours(frame: Frame, image: numpy.ndarray, is_rgb: bool, rectifier: PairRectifier | None = None) -> None:
     """
     Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; a grey image gives none. With the rectifier of a raw pair the image is the raw left one. Raises ImageError for an image of another size.
     """

@@ -17,6 +17,7 @@ from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
 from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
+from orbslam2py.settings.fisheye import needs_right_camera
 from orbslam2py.settings.foreign import FOREIGN_FORMATS, FORMATS, recognise_camera_file
 from orbslam2py.settings.pair_views import is_likely_baseline
 
@@ -140,6 +141,8 @@ def read_camera_file(
             _log.info(
                 "%s does not say the units of the depth images; %s", path, ASSUMED_DEPTH_FACTOR
             )
+    if sensor is Sensor.STEREO and settings.camera.is_fisheye and settings.right is None:
+        raise SettingsError(f"{path}: {needs_right_camera()}")
     return _made_for(path, settings, sensor, baseline, depth_factor)
 
 

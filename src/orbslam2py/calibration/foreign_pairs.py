@@ -187,8 +187,8 @@ def _found_pair(pair: Pair, size: tuple[int, int], fps: float) -> PairCameras:
         _require_overlap(pair, (left.K, right.K), size, T[:3, :3])
     _require_side_by_side(pair, T)
     try:
-        cameras = (raw_camera(one, fps) for one in (left, right))
-        return cameras_of_pair(*cameras, T, size, key)
+        first, second = (raw_camera(one, fps) for one in (left, right))
+        return cameras_of_pair(first, second, T, size, key)
     except SettingsError as error:
         raise SettingsError(
             f"{pair.where}: the pair cannot be rectified ({error}); look at intrinsics, distortion "
@@ -231,11 +231,12 @@ def _require_side_by_side(pair: Pair, T: FloatArray) -> None:
         return
     if x < 0 and -x >= max(abs(y), abs(z)):
         side = "to the left of it"
-        remedy = "exchange the two files"
+        remedy = f"exchange the two files, or invert {pair.file.place_key} if it is the inverse"
         if pair.may_be_exchanged:
             remedy = (
                 f"give --camera {pair.right.number} --sensor stereo, and take the images of "
-                f"{pair.right.name} as the left ones"
+                f"{pair.right.name} as the left ones; or invert {pair.file.place_key} if it is the "
+                "inverse"
             )
     else:
         side = ("below it" if y > 0 else "above it") if abs(y) >= abs(z) else "before or behind it"

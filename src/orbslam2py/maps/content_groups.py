@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,6 +44,10 @@ class ArrayGroup:
             yield field.name, getattr(self, field.name)
 
 
+#: Where `Cameras.lens` has the centre of the right camera of a fisheye pair.
+RIGHT_CENTRE = slice(13, 16)
+
+
 @dataclass(frozen=True, eq=False)
 class Cameras(ArrayGroup):
     """The cameras of the keyframes: (c,) entries each, usually one."""
@@ -70,10 +74,20 @@ class Cameras(ArrayGroup):
     """For a fisheye lens the number of its camera model in the list of models, from 1; 0 for a
     pinhole. `camera_model` gives the model itself."""
     lens: FloatArray
-    """(c, 16) parameters of that model, zeros after the last one."""
+    """(c, 16) parameters of that model, zeros after the last one. The last three are the centre of
+    the right camera of a fisheye pair in the frame of the left one [m], zeros if there is none."""
 
     def __len__(self) -> int:
         return len(self.fx)
+
+    def scaled(self, scale: float) -> Cameras:
+        """Return the cameras with lengths in another unit: one of them is `scale` new ones."""
+        lens = self.lens.copy()
+        # No model of a fisheye pair has so many parameters.
+        parameters = [len(one) for _, _, one in _core.camera_models()]
+        pairs = [n > 0 and parameters[n - 1] <= RIGHT_CENTRE.start for n in self.model.tolist()]
+        lens[pairs, RIGHT_CENTRE] *= scale
+        return replace(self, bf=scale * self.bf, lens=lens)
 
     def camera_model(self, row: int) -> CameraModel | None:
         """Return the model of a fisheye lens, or None for a pinhole."""
@@ -157,7 +171,7 @@ class Keyframes(ArrayGroup):
     descriptors: ByteArray
     """(n, 32) ORB."""
     depth: Float32Array
-    """(n,) depth along the optical axis [m]; -1 if unknown."""
+    """(n,) depth along the optical axis, for a fisheye lens along the ray [m]; -1 if unknown."""
     right_u: Float32Array
     """(n,) column in the (virtual) right image [px]; -1 if the depth is unknown."""
     colours: ByteArray

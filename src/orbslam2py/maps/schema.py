@@ -103,7 +103,8 @@ class Table(NamedTuple):
 #: Further coefficients of a camera since version 3.
 RATIONAL_LENS = ("k4", "k5", "k6")
 #: Of a fisheye lens since version 4: name of the camera model, its parameters as float64 (16,),
-#: zeros after the last one. A pinhole has an empty name.
+#: zeros after the last one; the last three are the centre of the right camera of a fisheye pair
+#: [m]. A pinhole has an empty name.
 FISHEYE_LENS = ("model", "lens")
 #: A pose as 7 float64: unit quaternion x, y, z, w, then the translation. A blob, because SQLite
 #: does not keep the sign of a zero in a REAL column.

@@ -143,7 +143,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "kalibr",
         "a camchain of Kalibr",
         "Kalibr",
-        "One camera, or the pair of the first two with its rectification. Fisheyes (one camera): "
+        "One camera, or the pair of the first two with its rectification. Fisheyes, also pairs: "
         "pinhole-equi, pinhole-fov, ds-none, eucm-none, omni-radtan, omni-none.",
         _line(r"^cam\d+\s*:"),
         "cam0:\n  camera_model: pinhole",
@@ -210,7 +210,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "euroc",
         "a sensor.yaml of EuRoC",
         "EuRoC's and TUM-VI's sensor.yaml of a camera",
-        "One camera, also equidistant; two files with --right are a pair with its rectification.",
+        "One camera, also equidistant; two files with --right are a pair, with its rectification.",
         _line(r"^sensor_type\s*:\s*camera", r"^intrinsics\s*:"),
         "sensor_type: camera\nintrinsics: [458.654, 457.296, 367.215, 248.375]",
         "right",
@@ -246,8 +246,8 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "basalt",
         "a calibration of Basalt",
         "Basalt, JSON",
-        "One camera, also kb4, ds, eucm, ucm and fov, or the pair of the first two pinholes with "
-        "its rectification.",
+        "One camera or the pair of the first two, also kb4, ds, eucm, ucm and fov; pinhole pairs "
+        "with their rectification.",
         _is_basalt,
         '{"value0": {"intrinsics": [{"camera_type": "pinhole", ...}]}}',
         "file",

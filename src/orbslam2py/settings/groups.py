@@ -397,7 +397,7 @@ class StereoRectification:
 
     left: CameraRectification
     right: CameraRectification
-    applied: bool = field(default=False, compare=False)
+    applied: bool = field(default=False, compare=False, kw_only=True)
 
     def __post_init__(self) -> None:
         for side in ("left", "right"):

@@ -47,12 +47,7 @@ def checked_extrinsics(T: object, name: str) -> FloatArray:
         pose = np.array(T, dtype=np.float64)
     except (TypeError, ValueError):
         pose = np.zeros(0)
-    rigid = pose.shape == (4, 4) and np.isfinite(pose).all()
-    if rigid:
-        R = pose[:3, :3]
-        rigid = bool(np.abs(R @ R.T - np.eye(3)).max() < _ROTATION_TOLERANCE)
-        rigid = rigid and np.linalg.det(R) > 0 and np.abs(pose[3] - (0, 0, 0, 1)).max() < 1e-6
-    if not rigid:
+    if not _is_rigid(pose):
         raise SettingsError(
             f"{name} is no rigid transform; give 4 x 4 numbers: a rotation and a translation in "
             "metres, with the last row 0, 0, 0, 1"
@@ -71,6 +66,14 @@ def inverse_of(T: FloatArray) -> FloatArray:
     inverse = np.eye(4)
     inverse[:3, :3], inverse[:3, 3] = T[:3, :3].T, -T[:3, :3].T @ T[:3, 3]
     return inverse
+
+
+def _is_rigid(T: FloatArray) -> bool:
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        return False
+    R = T[:3, :3]
+    off = float(np.abs(R @ R.T - np.eye(3)).max()), float(np.abs(T[3] - (0, 0, 0, 1)).max())
+    return off[0] < _ROTATION_TOLERANCE and off[1] < 1e-6 and float(np.linalg.det(R)) > 0
 
 
 @dataclass(frozen=True, eq=False)

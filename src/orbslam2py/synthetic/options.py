@@ -204,9 +204,11 @@ class SyntheticOptions:
         if not isinstance(pair, Settings):
             raise SettingsError(f"lens_pair is {shown(pair)}; give Settings of a raw pair")
         if self.size is not None or self.lens is not None:
-            raise SettingsError("lens_pair tells size and lens of both cameras; leave them out")
+            raise SettingsError(
+                "lens_pair (--lens) tells size and lenses of both cameras; leave size and lens out"
+            )
         if self.blur or self.imu:
-            raise SettingsError("lens_pair goes without blur and imu; leave them out")
+            raise SettingsError("a raw pair (--lens) goes without blur and imu; leave them out")
         check_lens_pair(pair, Sensor(self.sensor))
 
     def _check_pieces(self) -> None:

@@ -69,7 +69,10 @@ def test_settings_page_lists_the_keys(heading: str) -> None:
 def test_settings_page_lists_the_rectification() -> None:
     page = read(REFERENCE / "settings.md")
     rows = table_below(page, "Rectification of a raw stereo pair")
-    assert {code_in(row[0])[0] for row in rows} == set(keys.RECTIFICATION_KEYS)
+    assert {code_in(row[0])[0] for row in rows} == {
+        *keys.RECTIFICATION_KEYS,
+        *keys.RECTIFICATION_MODEL_KEYS,
+    }
     named = {name for row in table_below(page, "Built-in settings") for name in code_in(row[0])}
     assert named == set(BUILTIN_NAMES)
 

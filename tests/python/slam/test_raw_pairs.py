@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from orbslam2py import ImageError, Sensor, Settings, System
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets.rectification import rectifiers_of
+from orbslam2py.maps import load_map
 from orbslam2py.slam.front_end import FrontEnd
 from support.raw_pairs import distorted_pair, fisheye_pair, seen_through
 
@@ -136,3 +138,25 @@ def test_images_of_another_size_than_the_calibration(settings: Settings) -> None
             frame_of(settings, small, small)
     with pytest.raises(ImageError, match="left image has size 320x240, the right 300x200"):
         frame_of(settings, large, small)
+
+
+def test_a_saved_map_knows_the_right_camera(tmp_path: Path) -> None:
+    settings = fisheye_pair(195)
+    sequence = seen_through(settings, frames=4)
+    images = [sequence.load(i) for i in range(4)]
+    with System(settings, "stereo", deterministic=True) as slam:
+        for i in range(3):
+            slam.track((images[i].image, images[i].right), float(sequence.timestamps[i]))
+        slam.save_map(tmp_path / "map.orbmap")
+    stored = load_map(tmp_path / "map.orbmap").contents
+    centre = settings.right.centre  # type: ignore[union-attr]
+    np.testing.assert_array_equal(stored.cameras.lens[0, -3:], centre)
+    doubled = stored.cameras.scaled(2.0)
+    np.testing.assert_allclose(doubled.lens[0, -3:], 2 * centre)
+    np.testing.assert_array_equal(doubled.lens[0, :13], stored.cameras.lens[0, :13])
+    with System(settings, "stereo", load_map=tmp_path / "map.orbmap", deterministic=True) as slam:
+        record = slam.track((images[3].image, images[3].right), 10.0)
+    assert record.state.name == "OK"
+    assert record.T_wc is not None
+    moved = np.linalg.inv(sequence.T_wc(0)) @ sequence.T_wc(3)
+    np.testing.assert_allclose(record.T_wc, moved, atol=0.01)

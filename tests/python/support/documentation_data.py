@@ -42,6 +42,13 @@ cam1:
   resolution: [320, 240]
 """
 
+#: Of two lenses of 180 degrees.
+FISHEYE_CAMCHAIN = (
+    CAMCHAIN.replace("radtan", "equidistant")
+    .replace("[0.0, 0.0, 0.0, 0.0]", "[0.01, 0.0, 0.0, 0.0]")
+    .replace("200.0, 200.0", "100.0, 100.0")
+)
+
 #: What `batch` runs.
 JOBS = "sequences: [rgbd_dataset_freiburg1_desk]\noptions: {max_frames: 8}\nseeds: 2\n"
 
@@ -79,6 +86,7 @@ def make_data(folder: Path) -> None:
     write_image(folder / "hood.png", hood)
     write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 12), 4)
     (folder / "camchain.yaml").write_text(CAMCHAIN)
+    (folder / "fisheye-camchain.yaml").write_text(FISHEYE_CAMCHAIN)
     (folder / "jobs.yaml").write_text(JOBS)
     _write_vocabulary(folder)
 

@@ -89,7 +89,7 @@ def test_a_written_sequence_has_settings_with_the_lens(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"sensor": "stereo"}, ("pinhole", "mono or rgbd")),
+        ({"sensor": "stereo"}, ("of one camera", "lens_pair", "mono or rgbd")),
         ({"sensor": "mono", "blur": 0.5}, ("blur", "leave")),
         ({"sensor": "mono", "size": (320, 240)}, ("size and lens", "exclude")),
         ({"sensor": "mono", "lens": CameraSettings(200, 200, 160, 120)}, ("image size", "width")),

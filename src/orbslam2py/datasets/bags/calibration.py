@@ -299,13 +299,13 @@ def _fisheye_settings(
     if left.size != right.size:
         names = f"{left.what} and {right.what}"
         raise DatasetError(f"{names} are for images of different sizes; {_ADVICE}")
-    raw = [
+    first, second = (
         settings_of_camera(one, Sensor.MONOCULAR, fps, rectified=False, depth_factor=None).camera
         for one in (left, right)
-    ]
+    )
     try:
-        pair = cameras_of_pair(*raw, T_right_left, left.size, "the transform in the bag")
-        usual = settings_for_camera(raw[0], Sensor.MONOCULAR)
+        pair = cameras_of_pair(first, second, T_right_left, left.size, "the transform in the bag")
+        usual = settings_for_camera(first, Sensor.MONOCULAR)
         close = DepthSettings(close_factor=USUAL_CLOSE_FACTOR)
         return Settings(sensor=Sensor.STEREO, **pair.fields, orb=usual.orb, depth=close)
     except SettingsError as error:

@@ -54,7 +54,7 @@ def transform_map(
     return replace(
         contents,
         metric_roots=_metric_roots(contents, scale, metric=metric),
-        cameras=replace(cameras, bf=scale * cameras.bf),
+        cameras=cameras.scaled(scale),
         keyframes=replace(moved, depth=depth, scale=scale * keyframes.scale),
         points=replace(
             points,

@@ -58,7 +58,8 @@ def test_a_raw_pair_is_rectified(tmp_path: Path, kind: str) -> None:
         maps = cv2.initUndistortRectifyMap(
             K, np.array(D), np.asarray(info["R"]), np.asarray(info["P"])[:, :3], SIZE, cv2.CV_32FC1
         )
-        assert np.array_equal(image, cv2.remap(GREY, *maps, cv2.INTER_LINEAR))
+        fixed = cv2.convertMaps(*maps, cv2.CV_16SC2)  # in 1/32 pixel
+        assert np.array_equal(image, cv2.remap(GREY, *fixed, cv2.INTER_LINEAR))
 
 
 def test_a_rectified_pair_stays_as_it_is(tmp_path: Path) -> None:
@@ -111,7 +112,6 @@ def test_one_fisheye_camera(tmp_path: Path, D: tuple[float, ...], expected: bool
     [
         ("image_raw", {}, {}, "do not tell the distance of the two cameras"),
         ("image_rect", {}, {"bf": -3.0}, "stands to the left of the other one; exchange"),
-        ("image_raw", {"model": "equidistant"}, {"bf": 3.0, "D": D}, "equidistant is not support"),
         ("image_rect", {}, {"bf": 3.0, "K": K * 2}, "are no rectified pair: their P differ"),
         ("image_rect", {"size": (64, 48)}, {"bf": 3.0}, "is for 64 x 48 pixels, but images of"),
         ("image_rect", {"K": np.zeros((3, 3))}, {}, "of a camera that was not calibrated"),
@@ -128,6 +128,24 @@ def test_pairs_that_cannot_be_used(
     sequence = BagSequence(bags.write(tmp_path / "b", "mcap", messages(name, infos)))
     with pytest.raises(orb.DatasetError, match=message):
         _ = sequence.settings
+
+
+def test_a_fisheye_pair_stands_as_its_projections_tell(tmp_path: Path) -> None:
+    infos = raw_pair()
+    for info in infos.values():
+        info.update(model="equidistant", D=(0.01, 0.002, 0.0, 0.0), K=K * [[0.3], [0.3], [1]])
+        P = np.asarray(info["P"])
+        info["P"] = P * np.array([[0.3], [0.3], [1]])
+    sequence = BagSequence(bags.write(tmp_path / "b", "mcap", messages("image_raw", infos)))
+    right = sequence.settings.right
+    assert right is not None
+    assert right.camera.lens == sequence.settings.camera.lens == (0.01, 0.002, 0.0, 0.0)
+    P, R = (np.asarray(infos["right"][name]) for name in "PR")
+    R_left = np.asarray(infos["left"]["R"])
+    expected = -P[0, 3] / P[0, 0]
+    assert right.baseline == pytest.approx(expected)
+    np.testing.assert_allclose(right.T_right_left[:3, :3], R.T @ R_left, atol=1e-9)
+    np.testing.assert_allclose(R_left @ right.centre, [expected, 0, 0], atol=1e-9)
 
 
 def test_eight_coefficients(tmp_path: Path) -> None:
