@@ -128,7 +128,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, LocalBundleResult& res
 void acquit_aligned(const GatheredBundle& bundle, const Map& map,
                     std::vector<std::uint8_t>& outlier) {
   for (std::size_t i = 0; i < outlier.size(); ++i) {
-    if (outlier[i] == 0 || bundle.sources[i].kind == ObservationKind::kKeypoint) continue;
+    if (outlier[i] == 0 || bundle.kinds[i] == ObservationKind::kKeypoint) continue;
     const auto& o = bundle.problem.observations[i];
     const auto& camera = bundle.problem.cameras[o.camera];
     const KeyFrame* keyframe = map.find(bundle.keyframes[o.camera]);
@@ -156,7 +156,7 @@ void acquit_aligned(const GatheredBundle& bundle, const Map& map,
 
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular,
-                                          int n_threads, BundleSolver solver) {
+                                          int n_threads, BundleSolver solver, bool measures_noise) {
   LocalBundleResult result;
   if (abort != nullptr && abort->load()) {
     result.summary.aborted = true;
@@ -182,7 +182,7 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
     result.n_erased = erase_observations(bundle, result.summary.outlier, map);
   }
   if (moved) write_back(bundle, map);
-  if (result.summary.stage_one_done) measure_noise(bundle, map.noise());
+  if (measures_noise && result.summary.stage_one_done) measure_noise(bundle, map.noise());
   result.committed = true;
   return result;
 }

@@ -27,11 +27,13 @@ struct LocalBundleResult {
 /// keyframe. With a single camera and one fixed pose the scale is kept as well: the distances of
 /// the others from that one have the same sum as before. `abort` is polled once per iteration;
 /// nullptr: never. After an abort the progress is written; observations are erased only if the
-/// first stage was finished. See docs/method/mapping.md#local-bundle-adjustment and
+/// first stage was finished. `measures_noise`: the noise factors of the map follow the aligned
+/// sightings (keyframe_alignment.hpp). See docs/method/mapping.md#local-bundle-adjustment and
 /// docs/method/adjustment.md#local-bundle-adjustment.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
                                           int n_threads = 1,
-                                          BundleSolver solver = BundleOptions().solver);
+                                          BundleSolver solver = BundleOptions().solver,
+                                          bool measures_noise = false);
 
 }  // namespace orbslam

@@ -122,6 +122,7 @@ class LocalMapping:
             core.align_keyframes(
                 self._map,
                 keyframe,
+                alignment.noise,
                 patches_only=not alignment.new_keyframes,
                 n_threads=self._adjustment_threads,
             )
@@ -136,6 +137,7 @@ class LocalMapping:
                     self.worker.interrupt_flag,
                     self._monocular,
                     self._adjustment_threads,
+                    measures_noise=self._alignment is not None and self._alignment.noise == 0,
                 )
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)

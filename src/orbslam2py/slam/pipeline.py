@@ -391,7 +391,7 @@ def _make_search(
         setup.sensor,
         relocalizer,
         config.tracking,
-        config.alignment.for_sensor(setup.sensor).tracked_inliers,
+        config.alignment.for_sensor(setup.sensor),
     )
 
 
