@@ -25,7 +25,7 @@ def played(sensor: Sensor, changes: dict[str, Any], n_frames: int = 40) -> Syste
 
 
 def map_of(system: System) -> core.Map:
-    return system._pipeline.back_end.map
+    return system.pipeline.back_end.map
 
 
 def test_each_sensor_has_its_switch() -> None:
@@ -62,11 +62,11 @@ def test_repeated_runs_are_equal(sensor: Sensor) -> None:
 def test_right_images_are_aligned_where_that_is_switched_on() -> None:
     changes = ON | {"alignment.right_image": True}
     with played(Sensor.STEREO, changes, 3) as system:
-        frame = system._pipeline.tracking.motion.last.features
+        frame = system.pipeline.tracking.motion.last.features
         aligned = frame.right_variance > 0
         assert np.count_nonzero(aligned) > 0.7 * np.count_nonzero(frame.depth > 0)
     with played(Sensor.STEREO, ON, 3) as system:
-        assert len(system._pipeline.tracking.motion.last.features.right_variance) == 0
+        assert len(system.pipeline.tracking.motion.last.features.right_variance) == 0
 
 
 def test_only_the_newest_keyframes_keep_their_images(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,4 +92,4 @@ def test_only_the_newest_keyframes_keep_their_images(monkeypatch: pytest.MonkeyP
 
 def test_frames_keep_no_images_without_alignment() -> None:
     with played(Sensor.RGBD, OFF, 3) as system:
-        assert not system._pipeline.tracking.motion.last.features.has_images
+        assert not system.pipeline.tracking.motion.last.features.has_images
