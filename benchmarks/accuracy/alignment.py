@@ -23,23 +23,20 @@ from benchmarks.harness.runs import run_report
 from benchmarks.harness.tables import new_table
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
-OFF = (
-    *("alignment.right_image=false", "alignment.new_keyframes=false"),
-    *("alignment.new_keyframes_monocular=false", "alignment.tracked_inliers=0"),
-    "alignment.tracked_inliers_monocular=0",
-)
-KEYFRAMES = ("alignment.new_keyframes=true", "alignment.new_keyframes_monocular=true")
-FRAMES = ("alignment.tracked_inliers=200", "alignment.tracked_inliers_monocular=200")
+OFF = tuple(f"alignment.{sensor}=false" for sensor in ("rgbd", "stereo", "monocular"))
+ON = tuple(f"alignment.{sensor}=true" for sensor in ("rgbd", "stereo", "monocular"))
+NO_KEYFRAMES = ("alignment.new_keyframes=false",)
+NO_FRAMES = ("alignment.tracked_inliers=0",)
 RIGHT = ("alignment.right_image=true",)
-#: Changes of the configuration by the name of the column. The later ones count.
+#: Changes of the configuration by the name of the column.
 SWITCHES: dict[str, tuple[str, ...]] = {
     "default": (),
-    "right image": (*OFF, *RIGHT),
-    "keyframes": (*OFF, *KEYFRAMES),
-    "frames": (*OFF, *FRAMES),
-    "both": (*OFF, *KEYFRAMES, *FRAMES),
-    "all": (*KEYFRAMES, *FRAMES, *RIGHT),
-    "all, measured noise": (*KEYFRAMES, *FRAMES, *RIGHT, "alignment.noise=0"),
+    "right image": (*ON, *RIGHT, *NO_KEYFRAMES, *NO_FRAMES),
+    "keyframes": (*ON, *NO_FRAMES),
+    "frames": (*ON, *NO_KEYFRAMES),
+    "both": ON,
+    "all": (*ON, *RIGHT),
+    "both, noise 1": (*ON, "alignment.noise=1"),
 }
 RECORDED = [
     ("TUM desk", "tum_fr1_desk_rgb110", "mono"),

@@ -152,15 +152,17 @@ void bind_sightings(py::module_& module) {
 void bind_map_alignment(py::module_& module) {
   module.def(
       "align_keyframes",
-      [](Map& map, KeyFrameId keyframe, bool patches_only, int n_threads) {
-        const KeyframeAlignment done = align_keyframes(map, keyframe, patches_only, n_threads);
+      [](Map& map, KeyFrameId keyframe, double noise, bool patches_only, int n_threads) {
+        const KeyframeAlignment done =
+            align_keyframes(map, keyframe, noise, patches_only, n_threads);
         return std::make_pair(done.n_patches, done.counts);
       },
-      "map"_a, "keyframe"_a, "patches_only"_a = false, "n_threads"_a = 1, Release(),
+      "map"_a, "keyframe"_a, "noise"_a = 0.0, "patches_only"_a = false, "n_threads"_a = 1, Release(),
       "Align sightings to the patches of their points, in a new keyframe and in its neighbours\n"
-      "that keep their images; cut the patches that are missing. Returns (number of new patches,\n"
+      "that keep their images; cut the patches that are missing. `noise`: standard deviation of an\n"
+      "aligned sighting over that of a corner; 0: as patches and adjustments say. Returns (number of new patches,\n"
       "sightings tried by AlignmentFailure).");
-  module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, Release(),
+  module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, "noise"_a = 0.0, Release(),
              "Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the\n"
              "sightings tried by AlignmentFailure.");
   module.def(
@@ -171,12 +173,6 @@ void bind_map_alignment(py::module_& module) {
       "map"_a,
       "Factors on the standard deviations that patches give: (positions, right columns), as the\n"
       "map's adjustments have measured them.");
-  module.def(
-      "assume_alignment_noise",
-      [](Map& map, double over_corner) { map.noise().assume(over_corner); }, "map"_a,
-      "over_corner"_a,
-      "Standard deviation of aligned sightings over that of corners; 0: as patches and adjustments\n"
-      "say. To be set before the map is worked on.");
   module.def(
       "count_aligned",
       [](const Map& map) {

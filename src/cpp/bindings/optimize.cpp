@@ -306,18 +306,22 @@ void bind_local_bundle(py::module_& module) {
   module.def(
       "local_bundle_adjustment",
       [](Map& map, KeyFrameId keyframe, const std::shared_ptr<StopFlag>& abort, bool monocular,
-         int n_threads, const std::string& solver, InertialKeyframes* inertial) {
+         int n_threads, const std::string& solver, InertialKeyframes* inertial,
+         bool measures_noise) {
         const BundleSolver chosen = solver_named(solver);
         const py::gil_scoped_release release;
         return local_bundle_adjustment(map, keyframe, flag_of(abort), monocular, n_threads, chosen,
-                                       inertial);
+                                       inertial, measures_noise);
       },
       "map"_a, "keyframe"_a, "abort"_a = py::none(), "monocular"_a = false, "n_threads"_a = 1,
       "solver"_a = name_of(BundleOptions().solver), "inertial"_a = py::none(),
+      "measures_noise"_a = false,
       "Refine a keyframe, its neighbours and all their points; other observers are fixed.\n\n"
       "`abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for\n"
       "the scale. `solver`: of BundleOptions. `inertial`: InertialKeyframes, whose newest ones are\n"
-      "local, too, with residuals of the IMU between them; or None. Takes the map's locks for short sections only. A\n"
+      "local, too, with residuals of the IMU between them; or None. `measures_noise`:\n"
+      "alignment_noise() follows the residuals of aligned sightings. Takes the map's locks for\n"
+      "short sections only. A\n"
       "dead or unknown keyframe gives an empty result, a reset meanwhile drops it.");
 }
 

@@ -15,7 +15,7 @@
 #include "map/id_table.hpp"
 #include "map/keyframe.hpp"
 #include "map/map_point.hpp"
-#include "map/aligned_noise.hpp"
+#include "map/noise_factors.hpp"
 
 namespace orbslam {
 
@@ -209,9 +209,9 @@ class Map {
   void set_aligned(KeyFrameId id, std::size_t index, const AlignedSighting& sighting);
   /// Forgets it. The keypoint counts again.
   void clear_aligned(KeyFrameId id, std::size_t index);
-  /// What is assumed and measured of the noise of aligned sightings. Needs no lock.
-  AlignedNoise& noise() { return noise_; }
-  const AlignedNoise& noise() const { return noise_; }
+  /// Standard deviations of aligned sightings over those that their patches give, as measured.
+  NoiseFactors& noise() { return noise_; }
+  const NoiseFactors& noise() const { return noise_; }
 
   // ---- covisibility ----------------------------------------------------------------------------
   /// Recounts the shared points of a keyframe with all others, keeps the graph symmetric, and
@@ -283,7 +283,7 @@ class Map {
   MapPointId next_point_{0};
   std::size_t n_published_ = 0;
   std::map<MapIndex, Part> parts_{{0, {}}};  // the active one is among them
-  AlignedNoise noise_;
+  NoiseFactors noise_;
   MapIndex last_map_ = 0;
   std::atomic<MapIndex> active_map_{0};
   std::atomic<std::uint64_t> epoch_{0}, big_change_index_{0};

@@ -12,9 +12,15 @@ std::uint32_t begin_point(GatheredBundle& bundle, const MapPoint& point) {
   return static_cast<std::uint32_t>(bundle.points.size() - 1);
 }
 
+/// Inverse variance of an aligned position, which is never taken for worse than a corner.
+float aligned_weight(double factor, float variance, float corner_weight) {
+  const double weight = 1 / (factor * factor * static_cast<double>(variance));
+  return std::max(corner_weight, static_cast<float>(weight));
+}
+
 void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t point,
                      const KeyFrame& keyframe, const Observation& observation,
-                     const AlignedNoise& noise) {
+                     const NoiseFactors& noise) {
   const Frame& frame = *keyframe.frame;
   const Keypoint& keypoint = frame.keypoints[observation.index];
   BundleProblem::Observation o;
@@ -25,26 +31,24 @@ void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t
   o.right_u = frame.right_u[observation.index];
   o.inverse_sigma2 = frame.scales->inverse_sigma2(keypoint.level);
   o.has_depth = observation.has_depth;
-  ObservationSource source;
+  auto kind = ObservationKind::kKeypoint;
   const float corner = o.inverse_sigma2;
   if (const auto* a = keyframe.aligned_at(observation.index, bundle.points[point])) {
     o.u = a->u;
     o.v = a->v;
     o.right_u = a->right_u;
-    o.inverse_sigma2 = noise.weight(noise.position, a->variance, corner);
+    o.inverse_sigma2 = aligned_weight(noise.position.value(), a->variance, corner);
     const bool right = a->right_variance > 0;
     const float right_weight =
-        right ? noise.weight(noise.right, a->right_variance, corner) : corner;
+        right ? aligned_weight(noise.right.value(), a->right_variance, corner) : corner;
     o.right_factor = right_weight / o.inverse_sigma2;
-    source.kind = a->reference ? ObservationKind::kReference
-                  : right      ? ObservationKind::kAlignedRight
-                               : ObservationKind::kAligned;
-    source.variance = a->variance;
-    source.right_variance = a->right_variance;
+    kind = a->reference ? ObservationKind::kReference
+           : right      ? ObservationKind::kAlignedRight
+                        : ObservationKind::kAligned;
   }
   bundle.problem.observations.push_back(o);
   bundle.keypoints.push_back(observation.index);
-  bundle.sources.push_back(source);
+  bundle.kinds.push_back(kind);
 }
 
 /// Gives the reference sighting of the point that was added last the mean weight of those that were
@@ -58,9 +62,9 @@ void weigh_reference(GatheredBundle& bundle, const Map& map) {
   std::size_t i = observations.size();
   for (; i > 0 && observations[i - 1].point == point; --i) {
     auto& o = observations[i - 1];
-    if (bundle.sources[i - 1].kind == ObservationKind::kReference) {
+    if (bundle.kinds[i - 1] == ObservationKind::kReference) {
       reference = &o;
-    } else if (bundle.sources[i - 1].kind != ObservationKind::kKeypoint) {
+    } else if (bundle.kinds[i - 1] != ObservationKind::kKeypoint) {
       sum += o.inverse_sigma2;
       ++n;
     }

@@ -18,11 +18,6 @@ enum class ObservationKind : std::uint8_t {
   kReference,     ///< the corner at which the patch was cut
 };
 
-struct ObservationSource {
-  ObservationKind kind = ObservationKind::kKeypoint;
-  float variance = 0, right_variance = 0;  ///< that the patches give [pixels^2]
-};
-
 /// Part of a map copied into a BundleProblem, with the ids to find the way back. Filled under the
 /// map's read lock, solved without a lock, committed under the write lock. See
 /// docs/method/adjustment.md#local-bundle-adjustment.
@@ -31,7 +26,7 @@ struct GatheredBundle {
   std::vector<KeyFrameId> keyframes;     ///< per camera of the problem
   std::vector<MapPointId> points;        ///< per point
   std::vector<std::uint32_t> keypoints;  ///< per observation: slot of its keyframe
-  std::vector<ObservationSource> sources;  ///< per observation
+  std::vector<ObservationKind> kinds;    ///< per observation: what its position was measured by
   std::uint64_t epoch = 0;               ///< of the map when it was gathered
   std::uint64_t big_changes = 0;         ///< Map::big_change_index() then
   MapIndex map_index = kNoMap;           ///< of a full bundle: the map that it is of

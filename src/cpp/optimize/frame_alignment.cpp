@@ -40,9 +40,16 @@ std::vector<Sighting> sightings_of(const Map& map, const TrackedFrame& frame, st
   return chosen;
 }
 
+/// Inverse variance, never less than that of a corner. `noise`: as for align_frame().
+float weight_of(double noise, const NoiseFactor& measured, float variance, float corner) {
+  if (noise > 0) return std::max(corner, corner / static_cast<float>(noise * noise));
+  const double factor = measured.value();
+  return std::max(corner, static_cast<float>(1 / (factor * factor * static_cast<double>(variance))));
+}
+
 }  // namespace
 
-AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most) {
+AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most, double noise) {
   AlignmentCounts counts{};
   const Frame& f = *frame.frame;
   const auto images = f.images ? f.images->get() : nullptr;
@@ -67,11 +74,10 @@ AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t mos
     pixel.u = found.u;
     pixel.v = found.v;
     pixel.right_u = f.right_u[s.slot] + (found.u - keypoint.x);
-    pixel.inverse_sigma2 = map.noise().weight(map.noise().position, found.variance, corner);
+    pixel.inverse_sigma2 = weight_of(noise, map.noise().position, found.variance, corner);
     const float right = f.right_variance.empty() ? 0 : f.right_variance[s.slot];
     const float right_weight =
-        right > 0 ? map.noise().weight(map.noise().right, right + found.variance, corner)
-                  : corner;
+        right > 0 ? weight_of(noise, map.noise().right, right + found.variance, corner) : corner;
     pixel.right_factor = right_weight / pixel.inverse_sigma2;
   }
   return counts;

@@ -73,7 +73,7 @@ GatheredBundle reduce(const GatheredBundle& all, const std::vector<bool>& camera
     o.point = static_cast<std::uint32_t>(kept.points.size() - 1);
     kept.problem.observations.push_back(o);
     kept.keypoints.push_back(all.keypoints[i]);
-    kept.sources.push_back(all.sources[i]);
+    kept.kinds.push_back(all.kinds[i]);
   }
   return kept;
 }

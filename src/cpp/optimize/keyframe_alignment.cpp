@@ -132,6 +132,17 @@ void cut_missing_patches(Task& task) {
   }
 }
 
+/// Variances with which the factors in use give the assumed noise, if one is assumed.
+void assume(const NoiseFactors& factors, double noise, float corner, AlignedSighting& sighting) {
+  if (!(noise > 0)) return;
+  const auto variance_for = [&](const NoiseFactor& factor) {
+    const double deviation = noise / factor.value();
+    return static_cast<float>(deviation * deviation) * corner;
+  };
+  if (sighting.ok()) sighting.variance = variance_for(factors.position);
+  if (sighting.right_variance > 0) sighting.right_variance = variance_for(factors.right);
+}
+
 void align_one(const Task& task, Sighting& sighting) {
   const Point& point = task.points[sighting.point];
   if (!point.surface) return;
@@ -189,7 +200,8 @@ double factor_of(std::vector<double>& squares, double lost) {
 
 }  // namespace
 
-KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_only, int n_threads) {
+KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bool patches_only,
+                                  int n_threads) {
   KeyframeAlignment result;
   Task task = gather(map, current);
   if (task.sightings.empty()) return result;
@@ -210,7 +222,9 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_onl
                              if (task.sightings[i].is_new) align_one(task, task.sightings[i]);
                            }
                          });
-    for (const Sighting& s : task.sightings) {
+    for (Sighting& s : task.sightings) {
+      const Frame& frame = *task.views[s.view].frame;
+      assume(map.noise(), noise, frame.scales->sigma2(frame.keypoints[s.slot].level), s.result);
       if (s.is_new && s.result.point.valid()) ++result.counts[static_cast<std::size_t>(s.failure)];
     }
   }
@@ -218,35 +232,34 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_onl
   return result;
 }
 
-void measure_noise(const GatheredBundle& bundle, AlignedNoise& noise) {
+void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
   const BundleProblem& problem = bundle.problem;
   std::vector<double> squares, right_squares;
   double n_residuals = 0;
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
     const auto& o = problem.observations[i];
     n_residuals += o.has_depth ? 3 : 2;
-    const ObservationSource& source = bundle.sources[i];
-    const bool right_aligned = source.kind == ObservationKind::kAlignedRight;
-    if (source.kind != ObservationKind::kAligned && !right_aligned) continue;
+    const ObservationKind kind = bundle.kinds[i];
+    if (kind != ObservationKind::kAligned && kind != ObservationKind::kAlignedRight) continue;
     const auto& camera = problem.cameras[o.camera];
     const Eigen::Vector3d p = camera.T_cw * problem.points[o.point];
     Eigen::Vector2d error;
     if (!camera.model->error(p, o.u, o.v, error)) continue;
-    const double variance = source.variance;
-    squares.push_back(error.x() * error.x() / variance);
-    squares.push_back(error.y() * error.y() / variance);
-    if (!right_aligned || !o.has_depth) continue;
+    const double weight = o.inverse_sigma2;
+    squares.push_back(weight * error.x() * error.x());
+    squares.push_back(weight * error.y() * error.y());
+    if (kind != ObservationKind::kAlignedRight || !o.has_depth) continue;
     const double right = camera.model->right_error(p, error, o.u, o.v, o.right_u);
-    right_squares.push_back(right * right / static_cast<double>(source.right_variance));
+    right_squares.push_back(weight * static_cast<double>(o.right_factor) * right * right);
   }
   const double n_free = static_cast<double>(problem.cameras.size()) - bundle.n_fixed();
   const double n_unknowns = 3 * static_cast<double>(problem.points.size()) + 6 * n_free;
   if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
   // The adjustment has taken so much of the noise into its unknowns.
   const double lost = n_residuals / (n_residuals - n_unknowns);
-  noise.position.measure(factor_of(squares, lost));
+  noise.position.measure(noise.position.value() * factor_of(squares, lost));
   if (right_squares.size() < kFewestResiduals) return;
-  noise.right.measure(factor_of(right_squares, lost));
+  noise.right.measure(noise.right.value() * factor_of(right_squares, lost));
 }
 
 }  // namespace orbslam

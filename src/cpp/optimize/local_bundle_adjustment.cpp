@@ -146,7 +146,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, const InertialKeyframe
 void acquit_aligned(const GatheredBundle& bundle, const Map& map,
                     std::vector<std::uint8_t>& outlier) {
   for (std::size_t i = 0; i < outlier.size(); ++i) {
-    if (outlier[i] == 0 || bundle.sources[i].kind == ObservationKind::kKeypoint) continue;
+    if (outlier[i] == 0 || bundle.kinds[i] == ObservationKind::kKeypoint) continue;
     const auto& o = bundle.problem.observations[i];
     const auto& camera = bundle.problem.cameras[o.camera];
     const KeyFrame* keyframe = map.find(bundle.keyframes[o.camera]);
@@ -175,7 +175,7 @@ void acquit_aligned(const GatheredBundle& bundle, const Map& map,
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular,
                                           int n_threads, BundleSolver solver,
-                                          InertialKeyframes* inertial) {
+                                          InertialKeyframes* inertial, bool measures_noise) {
   LocalBundleResult result;
   if (abort != nullptr && abort->load()) {
     result.summary.aborted = true;
@@ -202,7 +202,7 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
   }
   if (moved) write_back(bundle, map);
   if (moved && inertial != nullptr) inertial->take_from(bundle, map);
-  if (result.summary.stage_one_done) measure_noise(bundle, map.noise());
+  if (measures_noise && result.summary.stage_one_done) measure_noise(bundle, map.noise());
   result.committed = true;
   return result;
 }

@@ -30,12 +30,15 @@ struct LocalBundleResult {
 /// the others from that one have the same sum as before. `abort` is polled once per iteration;
 /// nullptr: never. After an abort the progress is written; observations are erased only if the
 /// first stage was finished. With `inertial` the newest keyframes in time that have a state of the
-/// IMU are local, too, with residuals of the IMU between them; the scale is then no gauge. See docs/method/mapping.md#local-bundle-adjustment and
+/// IMU are local, too, with residuals of the IMU between them; the scale is then no gauge.
+/// `measures_noise`: the noise factors of the map follow the aligned sightings
+/// (keyframe_alignment.hpp). See docs/method/mapping.md#local-bundle-adjustment and
 /// docs/method/adjustment.md#local-bundle-adjustment.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
                                           int n_threads = 1,
                                           BundleSolver solver = BundleOptions().solver,
-                                          InertialKeyframes* inertial = nullptr);
+                                          InertialKeyframes* inertial = nullptr,
+                                          bool measures_noise = false);
 
 }  // namespace orbslam

@@ -59,7 +59,6 @@ class BackEnd:
         threaded = not options.deterministic
         self.map = core.Map()
         alignment = config.alignment.for_sensor(sensor)
-        core.assume_alignment_noise(self.map, alignment.noise)
         self.keyframe_index = core.KeyFrameIndex()
         self.events = EventDispatcher(callbacks, threaded=threaded)
         # The other core works on images while mapping goes on, unless these wait for it.

@@ -318,34 +318,33 @@ class TrajectoryConfig:
 class AlignmentConfig:
     """Which positions are measured by aligning patches of grey values."""
 
+    rgbd: bool = True
+    """Align with an RGB-D camera."""
+    stereo: bool = False
+    """Align with a stereo pair; helps where the rectification is exact."""
+    monocular: bool = False
+    """Align with a single camera; helps where the calibration is exact."""
     right_image: bool = False
-    """Align the right image of a stereo pair to the left one at every keypoint with a depth."""
+    """Where stereo pairs are aligned, align the right image to the left one as well."""
     new_keyframes: bool = True
-    """Align the sightings of new keyframes and new points before local bundle adjustment, with
-    stereo and RGB-D."""
-    new_keyframes_monocular: bool = False
-    """The same with a single camera."""
+    """Align the sightings of new keyframes and new points before local bundle adjustment."""
     tracked_inliers: int = 200
-    """Most inliers of a tracked frame that are aligned before its last pose optimization, with
-    stereo and RGB-D; 0: none."""
-    tracked_inliers_monocular: int = 0
-    """The same with a single camera."""
-    noise: float = 0.5
+    """Most inliers of a tracked frame that are aligned before its last pose optimization;
+    0: none."""
+    noise: float = 0.0
     """Standard deviation of an aligned sighting over that of a corner; 0: as patches and
-    residuals say, which needs an exact calibration."""
+    residuals say."""
 
     def for_sensor(self, sensor: Sensor) -> AlignmentConfig:
-        """Return the values in use: those for a single camera take the others' place."""
-        if sensor is Sensor.STEREO:
-            return self
-        changed = replace(self, right_image=False)
-        if sensor.has_depth:
-            return changed
-        return replace(
-            changed,
-            new_keyframes=self.new_keyframes_monocular,
-            tracked_inliers=self.tracked_inliers_monocular,
-        )
+        """Return the values in use with a sensor."""
+        on = {
+            Sensor.RGBD: self.rgbd,
+            Sensor.STEREO: self.stereo,
+            Sensor.MONOCULAR: self.monocular,
+        }
+        if not on[sensor]:
+            return replace(self, right_image=False, new_keyframes=False, tracked_inliers=0)
+        return replace(self, right_image=self.right_image and sensor is Sensor.STEREO)
 
     @property
     def uses_points(self) -> bool:

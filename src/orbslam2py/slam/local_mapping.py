@@ -124,6 +124,7 @@ class LocalMapping:
             core.align_keyframes(
                 self._map,
                 keyframe,
+                alignment.noise,
                 patches_only=not alignment.new_keyframes,
                 n_threads=self._adjustment_threads,
             )
@@ -139,6 +140,7 @@ class LocalMapping:
                     self._monocular,
                     self._adjustment_threads,
                     inertial=self.inertial,
+                    measures_noise=self._alignment is not None and self._alignment.noise == 0,
                 )
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)

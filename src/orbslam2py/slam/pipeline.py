@@ -422,7 +422,7 @@ def _make_search(
         setup.sensor,
         relocalizer,
         config.tracking,
-        config.alignment.for_sensor(setup.sensor).tracked_inliers,
+        config.alignment.for_sensor(setup.sensor),
         pixels_per_radian=setup.settings.camera.pixels_per_radian,
     )
 

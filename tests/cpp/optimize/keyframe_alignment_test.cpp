@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "optimize/bundle_gather.hpp"
 #include "optimize/frame_alignment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
 #include "optimize/pose_optimization.hpp"
@@ -73,7 +74,7 @@ TEST(AlignKeyframes, KeypointsStay) {
 
 TEST(AlignKeyframes, PatchesAloneMoveNothing) {
   Wall wall;
-  const KeyframeAlignment done = align_keyframes(wall.map, kNewest, true);
+  const KeyframeAlignment done = align_keyframes(wall.map, kNewest, 0, true);
   EXPECT_GT(done.n_patches, 0);
   EXPECT_EQ(done.counts, AlignmentCounts{});
   EXPECT_TRUE(wall.map.find(kNewest)->aligned.empty());
@@ -102,10 +103,11 @@ TEST(AlignKeyframes, AReplacedPointTakesNoSightingOfAnother) {
 
 TEST(AlignKeyframes, LocalAdjustmentIsMoreExactWithIt) {
   Wall corners, aligned;
-  aligned.map.noise().assume(0.2);
   align_keyframes(aligned.map, kNewest);
   for (Wall* wall : {&corners, &aligned}) {
-    ASSERT_TRUE(local_bundle_adjustment(wall->map, kNewest, nullptr).committed);
+    ASSERT_TRUE(local_bundle_adjustment(wall->map, kNewest, nullptr, false, 1,
+                                        BundleSolver::kBlocks, true)
+                    .committed);
   }
   EXPECT_LT(aligned.largest_error(), 0.7 * corners.largest_error());
   // Corners in the right images limit it; the noise of the left ones was measured.
@@ -116,7 +118,7 @@ TEST(AlignKeyframes, LocalAdjustmentIsMoreExactWithIt) {
 TEST(AlignKeyframes, RepeatedRunsGiveTheSameBytes) {
   Wall first, second;
   for (Wall* wall : {&first, &second}) {
-    align_keyframes(wall->map, kNewest, false, wall == &first ? 1 : 2);
+    align_keyframes(wall->map, kNewest, 0.5, false, wall == &first ? 1 : 2);
     local_bundle_adjustment(wall->map, kNewest, nullptr);
   }
   EXPECT_EQ(first.largest_error(), second.largest_error());
@@ -139,7 +141,7 @@ TrackedFrame tracked(const Wall& wall) {
 
 TEST(AlignFrame, TakesTheWantedNumberOfInliers) {
   Wall wall;
-  align_keyframes(wall.map, KeyFrameId(0), true);
+  align_keyframes(wall.map, KeyFrameId(0), 0, true);
   TrackedFrame frame = tracked(wall);
   ASSERT_GT(frame.n_associated(), 40U);
   const AlignmentCounts counts = align_frame(wall.map, frame, 20);
@@ -155,31 +157,40 @@ TEST(AlignFrame, TakesTheWantedNumberOfInliers) {
 
 TEST(AlignFrame, NoInlierIsLost) {
   Wall wall;
-  wall.map.noise().assume(0.1);
-  align_keyframes(wall.map, KeyFrameId(0), true);
+  align_keyframes(wall.map, KeyFrameId(0), 0, true);
   TrackedFrame frame = tracked(wall);
   const int before = optimize_pose(frame).n_inliers;
-  align_frame(wall.map, frame, 1000);
+  align_frame(wall.map, frame, 1000, 0.1);
   EXPECT_GE(optimize_pose(frame).n_inliers, before - 2);
 }
 
-TEST(AlignedNoise, FollowsMeasurementsAndNeverFallsBehindCorners) {
-  AlignedNoise noise;
-  EXPECT_FLOAT_EQ(noise.weight(noise.position, 0.01F, 0.5F), 0.5F);  // as a corner, if not told
-  noise.assume(0.5);
-  EXPECT_FLOAT_EQ(noise.weight(noise.position, 0.01F, 0.5F), 2.0F);
-  noise.assume(0);
-  noise.position.measure(3);
-  EXPECT_NEAR(noise.position.value(), 3, 1e-12);  // the first one counts alone
-  EXPECT_NEAR(noise.weight(noise.position, 0.01F, 0.5F), 1 / 0.09, 1e-4);
-  EXPECT_FLOAT_EQ(noise.weight(noise.position, 100, 0.5F), 0.5F);
-  noise.position.measure(std::nan(""));
-  noise.position.measure(-1);
-  EXPECT_EQ(noise.position.n_measured(), 1);
-  noise.position.measure(12);
-  EXPECT_NEAR(noise.position.value(), 6, 1e-9);  // the mean of the logarithms
+TEST(AlignKeyframes, TheAssumedNoiseGivesTheWeights) {
+  Wall wall;
+  align_keyframes(wall.map, kNewest, 0.5);
+  const GatheredBundle bundle = gather_full_bundle(wall.map);
+  std::size_t n_aligned = 0;
+  for (std::size_t i = 0; i < bundle.kinds.size(); ++i) {
+    // All keypoints are on level 0, where a corner has the weight 1.
+    const auto& o = bundle.problem.observations[i];
+    if (bundle.kinds[i] != ObservationKind::kAligned) continue;
+    EXPECT_NEAR(o.inverse_sigma2, 4, 1e-4);
+    EXPECT_NEAR(o.inverse_sigma2 * o.right_factor, 1, 1e-4);
+    ++n_aligned;
+  }
+  EXPECT_GT(n_aligned, bundle.kinds.size() / 3);
+}
+
+TEST(NoiseFactor, FollowsMeasurementsSlowly) {
+  NoiseFactor noise;
+  noise.measure(3);
+  EXPECT_NEAR(noise.value(), 3, 1e-12);  // the first one counts alone
+  noise.measure(std::nan(""));
+  noise.measure(-1);
+  EXPECT_EQ(noise.n_measured(), 1);
+  noise.measure(12);
+  EXPECT_NEAR(noise.value(), 6, 1e-9);  // the mean of the logarithms
   noise.forget();
-  EXPECT_EQ(noise.position.n_measured(), 0);
+  EXPECT_EQ(noise.n_measured(), 0);
 }
 
 }  // namespace

@@ -14,12 +14,8 @@ from orbslam2py.slam.config import AlignmentConfig
 from orbslam2py.slam.kept_images import KeptImages
 from support.small_sequences import ate, new_system, play
 
-OFF = {
-    "alignment.right_image": False,
-    "alignment.new_keyframes": False,
-    "alignment.tracked_inliers": 0,
-}
-ON = {"alignment.new_keyframes": True, "alignment.tracked_inliers": 200}
+OFF = {"alignment.stereo": False, "alignment.rgbd": False}
+ON = {"alignment.stereo": True, "alignment.rgbd": True}
 
 
 def played(sensor: Sensor, changes: dict[str, Any], n_frames: int = 40) -> System:
@@ -29,15 +25,18 @@ def played(sensor: Sensor, changes: dict[str, Any], n_frames: int = 40) -> Syste
 
 
 def map_of(system: System) -> core.Map:
-    return system._pipeline.back_end.map
+    return system.pipeline.back_end.map
 
 
-def test_a_single_camera_has_values_of_its_own() -> None:
-    config = AlignmentConfig(new_keyframes_monocular=True, tracked_inliers_monocular=7)
+def test_each_sensor_has_its_switch() -> None:
+    config = AlignmentConfig(stereo=True, rgbd=True, right_image=True)
     single = config.for_sensor(Sensor.MONOCULAR)
-    assert (single.new_keyframes, single.tracked_inliers) == (True, 7)
-    assert not single.right_image
-    assert config.for_sensor(Sensor.STEREO) == config
+    assert (single.new_keyframes, single.tracked_inliers) == (False, 0)
+    assert not single.uses_points
+    assert config.for_sensor(Sensor.STEREO).right_image
+    rgbd = config.for_sensor(Sensor.RGBD)
+    assert rgbd.uses_points
+    assert not rgbd.right_image
 
 
 def test_sightings_are_aligned_where_that_is_switched_on(sensor: Sensor) -> None:
@@ -46,7 +45,7 @@ def test_sightings_are_aligned_where_that_is_switched_on(sensor: Sensor) -> None
     with played(sensor, ON) as system:
         points = map_of(system).n_points
         assert core.count_aligned(map_of(system)) > points
-    with played(sensor, OFF | {"alignment.tracked_inliers": 200}) as system:
+    with played(sensor, ON | {"alignment.new_keyframes": False}) as system:
         assert core.count_aligned(map_of(system)) == 0  # of frames alone
 
 
@@ -61,13 +60,13 @@ def test_repeated_runs_are_equal(sensor: Sensor) -> None:
 
 
 def test_right_images_are_aligned_where_that_is_switched_on() -> None:
-    changes = OFF | {"alignment.right_image": True}
+    changes = ON | {"alignment.right_image": True}
     with played(Sensor.STEREO, changes, 3) as system:
-        frame = system._pipeline.tracking.motion.last.features
+        frame = system.pipeline.tracking.motion.last.features
         aligned = frame.right_variance > 0
         assert np.count_nonzero(aligned) > 0.7 * np.count_nonzero(frame.depth > 0)
-    with played(Sensor.STEREO, OFF, 3) as system:
-        assert len(system._pipeline.tracking.motion.last.features.right_variance) == 0
+    with played(Sensor.STEREO, ON, 3) as system:
+        assert len(system.pipeline.tracking.motion.last.features.right_variance) == 0
 
 
 def test_only_the_newest_keyframes_keep_their_images(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,4 +92,4 @@ def test_only_the_newest_keyframes_keep_their_images(monkeypatch: pytest.MonkeyP
 
 def test_frames_keep_no_images_without_alignment() -> None:
     with played(Sensor.RGBD, OFF, 3) as system:
-        assert not system._pipeline.tracking.motion.last.features.has_images
+        assert not system.pipeline.tracking.motion.last.features.has_images

@@ -14,7 +14,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.config import TrackingConfig
+from orbslam2py.slam.config import AlignmentConfig, TrackingConfig
 from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.state import State
 
@@ -62,8 +62,8 @@ class LocalMapSearch:
         The sensor.
     config : TrackingConfig
         Limits.
-    aligned_inliers : int
-        Most inliers that are aligned to the patches of their points at the end; 0: none.
+    alignment : AlignmentConfig or None
+        How many inliers are aligned to the patches of their points at the end; None: none.
     """
 
     def __init__(
@@ -71,11 +71,11 @@ class LocalMapSearch:
         slam_map: core.Map,
         sensor: Sensor,
         config: TrackingConfig,
-        aligned_inliers: int = 0,
+        alignment: AlignmentConfig | None = None,
     ) -> None:
         self._map = slam_map
         self._limits = config
-        self._aligned_inliers = aligned_inliers
+        self._alignment = alignment
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
@@ -168,9 +168,10 @@ class LocalMapSearch:
     def _aligned(self, frame: core.TrackedFrame, optimized: core.PoseEstimate) -> core.PoseEstimate:
         """Optimize once more with inliers at the places where patches put them."""
         enough = optimized.n_inliers >= self._limits.local_map_inliers
-        if not (self._aligned_inliers and enough):
+        alignment = self._alignment
+        if alignment is None or not (alignment.tracked_inliers and enough):
             return optimized
-        core.align_frame(self._map, frame, self._aligned_inliers)
+        core.align_frame(self._map, frame, alignment.tracked_inliers, alignment.noise)
         return core.optimize_pose(frame)
 
     def _enough_found(

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.config import TrackingConfig
+from orbslam2py.slam.config import AlignmentConfig, TrackingConfig
 from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import Relocalizer
@@ -56,7 +56,7 @@ class PoseSearch:
         sensor: Sensor,
         relocalizer: Relocalizer | None,
         config: TrackingConfig,
-        aligned_inliers: int = 0,
+        alignment: AlignmentConfig | None = None,
         *,
         pixels_per_radian: float = 0.0,
     ) -> None:
@@ -67,7 +67,7 @@ class PoseSearch:
         self.has_depth = sensor.has_depth
         self._relocalizer = relocalizer
         self.limits = config
-        self.local_map_search = LocalMapSearch(slam_map, sensor, config, aligned_inliers)
+        self.local_map_search = LocalMapSearch(slam_map, sensor, config, alignment)
 
     @property
     def motion_model_window(self) -> float:

@@ -38,34 +38,14 @@ class NoiseFactor {
   std::atomic<int> n_{0};
 };
 
-/// What is assumed of the aligned sightings of one camera: their positions, and their columns in the
-/// right image.
-class AlignedNoise {
- public:
+/// Of the aligned sightings of one camera: their positions, and their columns in the right image.
+struct NoiseFactors {
   NoiseFactor position, right;
-
-  /// The standard deviation of an aligned sighting over that of a corner of its level; 0: as the
-  /// patches say, times the measured factors. Set before work begins.
-  void assume(double over_corner) { over_corner_ = over_corner; }
-
-  /// Inverse variance of an aligned number whose patch gives `variance`, where that of a corner has
-  /// the inverse variance `corner` [pixels^-2]. It is never less than that of a corner.
-  float weight(const NoiseFactor& factor, float variance, float corner) const {
-    if (over_corner_ > 0) {
-      return std::max(corner, corner / static_cast<float>(over_corner_ * over_corner_));
-    }
-    const double deviation = factor.value();
-    const double weight = 1 / (deviation * deviation * static_cast<double>(variance));
-    return std::max(corner, static_cast<float>(weight));
-  }
 
   void forget() {
     position.forget();
     right.forget();
   }
-
- private:
-  double over_corner_ = 1;
 };
 
 }  // namespace orbslam
