@@ -14,7 +14,7 @@ from orbslam2py._arrays import EqualByValue, FloatArray, IntArray
 
 
 class TrackingState(enum.IntEnum):
-    """State of the tracker after an image."""
+    """State of tracking after an image; ``docs/method/tracking.md#state`` has the transitions."""
 
     NO_IMAGES_YET = 0
     NOT_INITIALIZED = 1
