@@ -57,7 +57,7 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
     Parameters
     ----------
     source
-        Where they come from.
+        The source of the images.
     sensor
         The sensor that the images are for.
 
@@ -102,7 +102,7 @@ def check_images(images: object, giver: str) -> None:
     Parameters
     ----------
     images
-        What was given.
+        The given object.
     giver
         Name of its source, for the message.
 
