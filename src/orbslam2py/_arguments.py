@@ -89,9 +89,9 @@ def member_of(
     names
         The enumeration.
     value
-        What was given.
+        The given object.
     what
-        What it is called.
+        Its name, for the message.
     error
         For any other object; the message lists all names.
     """
@@ -127,7 +127,7 @@ def finite_number(
     Parameters
     ----------
     value
-        What was given.
+        The given object.
     what, remedy
         Its name, and the remedy, for the message.
     error
@@ -150,7 +150,7 @@ def instance_of(
     Parameters
     ----------
     value
-        What was given.
+        The given object.
     kind
         The class.
     what, remedy
@@ -192,7 +192,7 @@ def patience_of(timeout: Any) -> float | None:
     Raises
     ------
     StateError
-        For anything else.
+        For any other object.
     """
     if timeout is None:
         return None
@@ -275,7 +275,7 @@ def array_of(
     value
         The object; lists of numbers are allowed.
     what
-        What it is called.
+        Its name, for the message.
     shape
         Required shape; -1 allows any length.
     error

@@ -72,7 +72,7 @@ def write_figure(path: str | PathLike[str], figure: Figure, *, dpi: float | None
     path
         The file.
     figure
-        What is drawn.
+        The figure.
     dpi
         Pixels per inch; by default those of the figure.
 

@@ -75,11 +75,11 @@ def utf8_path(
     Parameters
     ----------
     path
-        Where the file is.
+        Path of the file.
     error
         If the path has bytes that are not UTF-8.
     remedy
-        What to do then.
+        The remedy.
     """
     try:
         return os.fsencode(path).decode()
@@ -119,7 +119,7 @@ def take_mode(place: Path, target: Path, more: int = 0) -> None:
     Parameters
     ----------
     place
-        What will replace it.
+        The replacement.
     target
         If there is none, nothing happens.
     more

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which version is installed."""
+"""The installed version."""
 
 from importlib.metadata import version
 

@@ -69,7 +69,7 @@ def open_workers(workers: Workers, most: int | None = None) -> Iterator[Any]:
     Parameters
     ----------
     workers
-        Which.
+        Options of the workers.
     most
         Largest number of workers; None for no limit.
 
@@ -137,7 +137,7 @@ def run_on(
     client
         From `open_workers`.
     jobs
-        What to run.
+        The jobs.
     results
         The folder of the batch, which all workers see.
     stop

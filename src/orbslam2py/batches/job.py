@@ -40,7 +40,7 @@ class Job:
     settings
         A file or a built-in name; None: the settings of the sequence.
     topics
-        Of a bag.
+        Topics of a bag.
     options
         Options of the run that are not default.
     parameters

@@ -156,7 +156,7 @@ def _sequences(entry: Any, folder: Path) -> Iterator[dict[str, Any]]:
 
 
 def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
-    """Yield all combinations of options; a list stands for several values."""
+    """Yield all combinations of options; a list means several values."""
     if not isinstance(values, Mapping):
         raise SettingsError(
             f"options are {shown(values)}; give 'NAME: VALUE' in lines of their own"

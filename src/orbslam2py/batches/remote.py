@@ -83,7 +83,7 @@ def here(path: str, cache: Cache) -> Iterator[Path]:
         A folder, a file, an archive, or an address for fsspec; of a folder in an archive
         ``zip://FOLDER::ADDRESS``.
     cache
-        Where it goes.
+        Its destination.
 
     Yields
     ------

@@ -30,7 +30,7 @@ class Group:
     Attributes
     ----------
     setting
-        What they have in common.
+        Their common options.
     n_runs, n_failed
         Their number, and how many of them failed.
     ate_rmse_m, tracked_fraction, frames_per_second, peak_memory_mb

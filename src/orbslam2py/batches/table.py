@@ -42,8 +42,8 @@ def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
     """Write ``results.sqlite``, ``results.csv`` and, with pyarrow, ``results.parquet``.
 
     Rows are in the order of their names, not in the order in which the runs ended. Values that a
-    file cannot hold become text: signed integers beyond 64 bits, and names of files that are no
-    valid text, as far as they can be read.
+    file cannot hold become text: signed integers beyond 64 bits, and readable forms of file names
+    that are no valid text.
 
     Returns
     -------

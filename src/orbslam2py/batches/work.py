@@ -60,7 +60,7 @@ def run_job(
     Parameters
     ----------
     job
-        What to run.
+        The jobs.
     results
         The location of the batch.
     threads

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The options of ``orbslam2py run``: what the images are, how to work, and what to write."""
+"""The options of ``orbslam2py run``: input, method, and output."""
 
 from __future__ import annotations
 

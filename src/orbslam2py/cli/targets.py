@@ -39,7 +39,7 @@ def check_apart(outputs: Mapping[str, Path | None], inputs: Iterable[Path] = ())
     outputs
         The written files, by their options.
     inputs
-        What is read.
+        The input files.
 
     Raises
     ------

@@ -74,7 +74,7 @@ class Viewing:
     options : ViewerOptions
         Whether, and where.
     sequence : Sequence or LiveSource
-        What is run.
+        The sequence.
     in_real_time : bool
         Images come in real time: drawing must not delay tracking.
     stop : threading.Event

@@ -74,7 +74,7 @@ class MaskFolder:
     Parameters
     ----------
     folder
-        Where the masks are.
+        The file or folder of the masks.
     sequence
         The images.
 

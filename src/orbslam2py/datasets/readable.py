@@ -15,7 +15,7 @@ class ReadableLayout:
     Attributes
     ----------
     name
-        What it is called.
+        Its name, for the message.
     sensors
         Sensors that it can have images for.
     description

@@ -51,7 +51,7 @@ class RecordedSequence(FramesInOrder, ABC):
     Parameters
     ----------
     folder
-        Where the images are.
+        The folder of the sequence.
     available
         Sensors that there are images for, the richest first.
     sensor

@@ -147,7 +147,7 @@ class DepthRegistration:
 def _centres_in(
     middle: NDArray[np.float32], half: NDArray[np.float32], size: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First and last pixel of the image whose centre lies in [middle - half, middle + half)."""
+    """Return the first and last pixel whose centre is in [middle - half, middle + half)."""
     half = np.minimum(half, np.float32(_WIDEST / 2))
     first = np.clip(np.ceil(middle - half), 0, size).astype(np.int32)
     last = np.clip(np.ceil(middle + half) - 1, -1, size - 1).astype(np.int32)

@@ -39,7 +39,7 @@ class ImagePair:
     Attributes
     ----------
     folder
-        Where both lie.
+        The folder that contains both.
     left, right
         Name of the images in messages.
     left_files, right_files

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An estimate brought onto the truth: the transform between worlds, and how it is chosen."""
+"""Alignment of an estimate with ground truth: the transform between worlds, and its choice."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _FEWEST_POSES = 3  # from this number on, a scale differs from an error
 
 
 class Alignment(str, Enum):
-    """How the estimate is moved onto the truth before the absolute error is taken."""
+    """Alignment of the estimate with the ground truth, before the absolute error is computed."""
 
     SE3 = "se3"
-    """Turned and shifted."""
+    """Rotation and translation."""
     SIM3 = "sim3"
-    """Turned, shifted and scaled: for one camera, which cannot see metres."""
+    """Rotation, translation and scale: for a single camera, which has no metric scale."""
     NONE = "none"
-    """Left as it is: both are in one world."""
+    """No transform: both are in one world."""
     AUTO = "auto"
     """``sim3`` for a single camera, ``se3`` for others;
-    chosen from the lengths of the paths if the sensor is not known."""
+    chosen by the lengths of the paths if the sensor is not known."""
 
     @classmethod
     def of(cls, value: Alignment | str) -> Alignment:
@@ -37,7 +37,7 @@ class Alignment(str, Enum):
         Raises
         ------
         DatasetError
-            Listing the names, if there is none like that.
+            For an unknown name; the message lists the names.
         """
         return member_of(cls, value, "the alignment")
 
@@ -51,7 +51,7 @@ class Alignment(str, Enum):
 
 
 def differ_in_unit(points: FloatArray, targets: FloatArray) -> float | None:
-    """Tell whether lengths are in another unit, as those of a single camera are.
+    """Return the ratio of the units if lengths differ, as with a single camera.
 
     Parameters
     ----------
@@ -77,14 +77,14 @@ def differ_in_unit(points: FloatArray, targets: FloatArray) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class FitByTime:
-    """How one path lies on another."""
+    """The alignment of one path with another."""
 
     similarity: Similarity
-    """From the world of the one to that of the other."""
+    """From the world of the first to that of the second."""
     rows: IntArray
-    """(k,) poses of the one that were compared."""
+    """(k,) compared poses of the first path."""
     other_rows: IntArray
-    """(k,) poses of the other, at the same times."""
+    """(k,) poses of the second path, at the same times."""
 
 
 def fit_by_time(
@@ -96,14 +96,14 @@ def fit_by_time(
     with_scale: bool,
     fewest: int = _FEWEST_POSES,
 ) -> FitByTime | None:
-    """Find what moves a path onto another, by the poses at the same times (Umeyama, PAMI 1991).
+    """Align a path with another, by the poses at the same times (Umeyama, PAMI 1991).
 
     Parameters
     ----------
     times, other_times
         Seconds, float64 (n,) and (m,).
     positions, other_positions
-        Float64 (n, 3) and (m, 3), each in a world of its own.
+        Float64 (n, 3) and (m, 3), each in its own world.
     with_scale
         The worlds may differ in their unit.
     fewest

@@ -17,7 +17,7 @@ _UNUSUAL_STEP = 5.0  # times the median step
 
 @dataclass(frozen=True)
 class Matched:
-    """What was compared.
+    """The compared poses.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ class ErrorStatistics:
     rmse
         Root of the mean square.
     mean, median, max
-        Of the errors.
+        Unit of the errors.
     """
 
     rmse: float
@@ -72,7 +72,7 @@ class Evaluation:
     Attributes
     ----------
     matched
-        Which poses were compared.
+        The compared poses.
     alignment
         The alignment that was used; never ``auto``.
     transform

@@ -106,7 +106,7 @@ class MapArrays:
 
     @classmethod
     def load(cls, path: str | Path) -> MapArrays:
-        """Read what `save` has written.
+        """Read a file of `save`.
 
         Raises
         ------

@@ -61,7 +61,7 @@ class MapFile:
 
     @property
     def sensor(self) -> Sensor:
-        """What the map was made from."""
+        """Camera, vocabulary and runs of the map."""
         return self.settings.sensor
 
     def check(self) -> None:

@@ -124,7 +124,7 @@ class SavedMap:
 
     @property
     def sensor(self) -> Sensor:
-        """What the map was made from."""
+        """Camera, vocabulary and runs of the map."""
         return self.settings.sensor
 
     @property

@@ -62,7 +62,7 @@ def check_made_alike(files: Sequence[SavedMap | MapFile]) -> None:
 
 
 def check_camera(saved: SavedMap | MapFile, settings: Settings) -> None:
-    """Raise `SettingsError`, saying what differs, unless the map was made with this camera."""
+    """Raise `SettingsError` with the differences, unless the map was made with this camera."""
     differences = list(_differences(saved.settings, settings))
     if differences:
         raise SettingsError(

@@ -36,7 +36,7 @@ def verify_map_file(path: str | os.PathLike[str]) -> SavedMap:
     Returns
     -------
     SavedMap
-        What it holds.
+        The contents of the file.
 
     Raises
     ------

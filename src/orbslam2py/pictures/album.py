@@ -20,7 +20,7 @@ _JPEG_QUALITY = 80
 
 @dataclass(frozen=True)
 class KeyframePicture:
-    """What a keyframe saw."""
+    """The view of a keyframe."""
 
     image: ByteArray
     """(h, w, 3) red, green, blue, keypoints marked."""

@@ -280,9 +280,9 @@ def draw_status(width: int, status: Status) -> ByteArray:
     Parameters
     ----------
     width : int
-        Of the strip [px].
+        Height of the strip [px].
     status : Status
-        What to say.
+        The text.
 
     Returns
     -------

@@ -132,7 +132,7 @@ def draw_time_line(history: History, size: tuple[int, int], *, text: int = 14) -
     Parameters
     ----------
     history : History
-        What there is.
+        The recorded history.
     size : (int, int)
         Width and height [px].
     text : int

@@ -113,7 +113,7 @@ def draw_top_view(
     Parameters
     ----------
     scene : MapPicture
-        What there is.
+        The recorded history.
     framing : Framing
         The visible part of the map, and its scale.
     T_wc : array of float64, (4, 4), optional

@@ -25,7 +25,7 @@ class OutputFile:
     Parameters
     ----------
     path : str or Path
-        What it becomes.
+        Final path of the file.
     what : str
         Its name in messages: "video".
     suffixes : iterable of str
@@ -34,9 +34,9 @@ class OutputFile:
     Attributes
     ----------
     path : Path
-        As given.
+        The path as given.
     temporary : Path
-        Where to write.
+        Path to write to.
 
     Raises
     ------

@@ -108,7 +108,7 @@ class RerunRecorder:
 
     @property
     def path(self) -> Path:
-        """Where it will be."""
+        """Path of the file."""
         return self._file.path
 
     # ---- notifications ---------------------------------------------------------------------------

@@ -127,7 +127,7 @@ class VideoWriter:
 
     @property
     def path(self) -> Path:
-        """Where it will be."""
+        """Path of the file."""
         return self._file.path
 
     @property

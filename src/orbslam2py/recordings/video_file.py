@@ -58,7 +58,7 @@ class VideoFile:
 
     @property
     def path(self) -> Path:
-        """Where it will be."""
+        """Path of the file."""
         return self._file.path
 
     def write(self, picture: ByteArray) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks whether a calibration fits the first images of a run; warns once, and the run goes on."""
+"""Checks whether a calibration fits the first images of a run, and warns once."""
 
 from __future__ import annotations
 
@@ -245,15 +245,15 @@ def check_calibration(
 ) -> Misfit | None:
     """Check whether a calibration fits the first images of a sequence.
 
-    The same as `orbslam2py.run_sequence` does on the way: size and middle of the images, what is
-    known of the data set, the rows of a stereo pair, and whether another focal length or lens
-    explains better how the first 49 images move. Logs the misfit as a warning.
+    `orbslam2py.run_sequence` makes the same checks during a run: size and centre of the images,
+    known data sets, the rows of a stereo pair, and whether another focal length or lens explains
+    the motion of the first 49 images better. Logs the misfit as a warning.
 
     Parameters
     ----------
     source : sequence, or iterable of frames
-        As from `orbslam2py.open_sequence`, or whatever gives frames with a ``timestamp`` and
-        ``images``, consecutive ones.
+        A sequence from `orbslam2py.open_sequence`, or any source of consecutive frames with
+        ``timestamp`` and ``images``.
     settings : Settings, str or Path, optional
         The calibration: settings, or for a source that tells its sensor a file or a built-in name;
         by default the source's own.

@@ -27,7 +27,7 @@ class Height:
     up: FloatArray
     """Unit vector (3,) in the frame of the first keyframe's camera."""
     label: str
-    """For an axis."""
+    """Name for an axis."""
 
     @classmethod
     def of_first_keyframe(cls) -> Height:

@@ -23,7 +23,7 @@ def check_not_among_images(output: Path, sequence: object, source: Path | None =
     output : Path
         Folder of the results.
     sequence : Sequence or LiveSource
-        What is run.
+        The sequence.
     source : Path, optional
         The folder of the sequence; by default from the sequence itself (`folder` or `path`).
 

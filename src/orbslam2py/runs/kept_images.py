@@ -84,7 +84,7 @@ class KeptImages:
         image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
             The image from the camera.
         record : TrackingRecord
-            What became of it.
+            Result of the frame.
         """
         is_lost = record.state is TrackingState.LOST
         if is_lost and self._was_tracked and len(self._lost) < _MOST_LOST:

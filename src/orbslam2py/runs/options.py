@@ -40,7 +40,7 @@ class RunOptions:
     sensor: Sensor
     """The sensor."""
     system: SystemOptions = field(default_factory=SystemOptions)
-    """How the system works. Recorded images always wait for mapping, unless `realtime` is set; a
+    """Options of the system. Recorded images always wait for mapping, unless `realtime` is set; a
     camera's never do."""
     realtime: bool = False
     """Follow the time stamps and drop late frames, as with a camera; otherwise every frame is

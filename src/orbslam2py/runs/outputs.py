@@ -219,7 +219,7 @@ class OutputWriter:
     Parameters
     ----------
     folder : Path
-        Where to.
+        The folder.
     """
 
     def __init__(self, folder: Path) -> None:

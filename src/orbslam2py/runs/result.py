@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run gives."""
+"""The results of a run."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class RunResult:
     interrupted: bool = False
     """Whether the run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None
-    """What ended it."""
+    """Why it ended early."""
     started: str = ""
     """Date and time of its beginning, ISO 8601 with the time zone."""
     command: str | None = None

@@ -47,7 +47,7 @@ def settings_for_camera(
     camera
         The camera; its ``bf`` is used if there is no `baseline`.
     sensor
-        What delivers the images.
+        The sensor.
     baseline
         Distance of the two cameras of a pair [m]. For RGB-D the equivalent baseline: points nearer
         than 40 baselines are close; by default 0.075 m, which gives 3 m.

@@ -44,7 +44,7 @@ class CameraSettings:
         Radial-tangential distortion in OpenCV's order; all 0 for rectified images and fisheye
         lenses.
     width, height
-        Image size in pixels as far as known. Never enforced: the first image decides.
+        Image size in pixels, if known. Never enforced: the first image decides.
     fps
         Frames per second.
     bf

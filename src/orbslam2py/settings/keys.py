@@ -220,7 +220,7 @@ def nearest_key(name: str, *, spelling: bool = True) -> str | None:
     Parameters
     ----------
     name
-        As somebody wrote it.
+        The key as written.
     spelling
         Also accept keys with a similar spelling.
     """

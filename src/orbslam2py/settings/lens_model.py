@@ -65,7 +65,7 @@ def lens_of_file(entries: Mapping[str, Entry], path: Path, sensor: Sensor) -> Fi
     entries
         The entries of the file, nested ones by their path.
     path, sensor
-        Of the file, and what it is read for.
+        The settings file's path, and the sensor.
 
     Raises
     ------

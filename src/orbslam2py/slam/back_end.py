@@ -46,7 +46,7 @@ class BackEnd:
     sensor : Sensor
         The sensor.
     options : SystemOptions
-        How to work.
+        Options of the system.
     config : Config
         Thresholds.
     callbacks : Callbacks

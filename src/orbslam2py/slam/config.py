@@ -2,7 +2,7 @@
 """The configuration of the method: one section per stage, one number per threshold.
 
 The defaults are the published system's unless a field says otherwise; ``docs/method`` says chapter
-by chapter where each comes from. Thresholds of single steps stand beside them in C++. Names with a
+by chapter where each comes from. Thresholds of single steps are in their C++ files. Names with a
 dot, as in ``tracking.map_matches``, reach every field from the command line, job files and Python.
 """
 
@@ -29,7 +29,7 @@ _INLIERS = (
 
 @dataclass(frozen=True)
 class InitializationConfig:
-    """How a map may begin."""
+    """Start of a map."""
 
     keypoints_with_depth_sensor: int = 500
     """A stereo or RGB-D frame begins a map only with more keypoints than this (ORB-SLAM2)."""
@@ -85,7 +85,7 @@ class InitializationConfig:
 
 @dataclass(frozen=True)
 class TrackingConfig:
-    """When a pose is believed, and how far around a prediction is searched."""
+    """Required matches and inliers of a pose, and search windows."""
 
     motion_model_window: float = 15.0
     """Half width of the search window around predicted keypoints, pixels at level 0
@@ -134,7 +134,7 @@ class TrackingConfig:
 
 @dataclass(frozen=True)
 class AcceptanceConfig:
-    """How much must speak for a pose, and where else it is looked for."""
+    """Evidence required for a pose, and the search of other hypotheses."""
 
     search_again: bool = True
     """Search other hypotheses when the evidence for a pose falls."""
@@ -193,7 +193,7 @@ class KeyframeConfig:
     share_monocular: float = 0.9
     """The same share with a single camera (ORB-SLAM)."""
     weak_share: float = 0.25
-    """Below this share mapping is not waited for, with stereo and RGB-D (ORB-SLAM2)."""
+    """Below this share a keyframe does not wait for mapping, with stereo and RGB-D (ORB-SLAM2)."""
     few_close_points: int = 100
     """Fewer tracked close points than this are few; a keyframe is needed if many others are
     not in the map (ORB-SLAM2)."""
@@ -220,7 +220,7 @@ class KeyframeConfig:
 
 @dataclass(frozen=True)
 class RelocalizationConfig:
-    """When a lost frame counts as found."""
+    """Relocalization of a lost frame."""
 
     ratio: float = 0.75
     """Largest ratio of best to second best descriptor distance in matching by words
@@ -260,7 +260,7 @@ class RelocalizationConfig:
 
 @dataclass(frozen=True)
 class MappingConfig:
-    """What local mapping looks at around a new keyframe."""
+    """The neighbourhood of a new keyframe in local mapping."""
 
     neighbours: int = 10
     """Number of covisible keyframes with which points are triangulated and fused, with
@@ -278,7 +278,7 @@ class MappingConfig:
 
 @dataclass(frozen=True)
 class LoopConfig:
-    """Where loops are looked for."""
+    """Search of loops."""
 
     gap: int = 10
     """Number of keyframes after a loop that are not searched for another (ORB-SLAM)."""
@@ -288,7 +288,7 @@ class LoopConfig:
 
 @dataclass(frozen=True)
 class MergingConfig:
-    """When two maps are believed to show the same place."""
+    """Evidence required for a merge of two maps."""
 
     confirmations: int = 2
     """Number of neighbours that must confirm it."""
@@ -399,12 +399,12 @@ class Config:
         return replace(self, **changed)
 
     def changes(self) -> dict[str, float | int | bool]:
-        """Return what differs from the defaults, by names with a dot."""
+        """Return the differences from the defaults, by names with a dot."""
         usual = Config()
         return {name: value for name, value in all_values(self) if value != value_of(usual, name)}
 
     def for_features(self, n_features: int) -> Config:
-        """Return the configuration for images with so many features: fewer inliers of few ones."""
+        """Return the configuration for this number of features: with few, fewer inliers."""
         share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
         changes = {name: math.ceil(share * value_of(self, name)) for name in _INLIERS}
         return self.with_changes(changes)
@@ -437,7 +437,7 @@ def value_of(config: Config, name: str) -> float | int | bool:
     Raises
     ------
     SettingsError
-        If there is none; says which name is nearest.
+        If there is none; the message gives the nearest name.
     """
     known = dict(all_values(config))
     if name in known:

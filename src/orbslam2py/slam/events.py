@@ -195,7 +195,7 @@ class Callbacks:
         Raises
         ------
         SettingsError
-            For anything else.
+            For any other object.
         """
         if value is not None and not isinstance(value, Callbacks):
             raise SettingsError(
@@ -215,7 +215,7 @@ class EventDispatcher:
     Parameters
     ----------
     callbacks : Callbacks
-        Who wants to know.
+        Receives the events.
     threaded : bool
         Whether to use a separate thread; otherwise inline.
     """

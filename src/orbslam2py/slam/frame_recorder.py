@@ -135,7 +135,7 @@ class FrameRecorder:
         fixed_map: bool = False,
         in_doubt: bool = False,
     ) -> None:
-        """Record a frame; a lost one has no pose of its own.
+        """Record a frame; a lost one has no pose.
 
         Parameters
         ----------

@@ -67,7 +67,7 @@ def timed_images(
     Parameters
     ----------
     source
-        Where they come from.
+        The source of the images.
     sensor
         What the images are needed for.
     with_imu
@@ -115,7 +115,7 @@ def check_images(images: object, giver: str) -> None:
     Parameters
     ----------
     images
-        What was given.
+        The given object.
     giver
         Name of its source, for the message.
 

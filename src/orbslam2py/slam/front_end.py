@@ -42,7 +42,7 @@ class FrontEnd:
     settings : Settings
         Calibration and extractor settings.
     sensor : Sensor
-        Which images come.
+        The sensor.
     check_calibration : bool
         Warn if the calibration cannot belong to images of that size.
     keep_images : bool

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Full bundle adjustment of all keyframes and points, while the system goes on.
+"""Full bundle adjustment of all keyframes and points, while the system continues to run.
 
 Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-D;
 ``docs/method/adjustment.md#full-bundle-adjustment``.

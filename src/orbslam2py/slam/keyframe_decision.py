@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which frames become keyframes.
+"""The decision whether a frame becomes a keyframe.
 
 Mur-Artal, Montiel and Tardos, 2015, section V-E; close points: Mur-Artal and Tardos, 2017, section
 III-E; ``docs/method/tracking.md#new-keyframes``.
@@ -72,7 +72,7 @@ class KeyframeDecision:
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            With its associations.
+            The frame, with its associations.
         reference_keyframe : int
             The keyframe that shares most points with the frame.
         n_inliers : int

@@ -32,7 +32,7 @@ _SWITCHES = (
 
 @dataclass(frozen=True)
 class SystemOptions:
-    """How a `System` works. Each is also a keyword of its constructor, which describes them.
+    """Options of a `System`. Each is also a keyword of its constructor, which describes them.
 
     Raises
     ------

@@ -26,7 +26,7 @@ class PairCheck:
     Attributes
     ----------
     warning : str or None
-        What was told.
+        The warning that was logged.
     """
 
     def __init__(self) -> None:

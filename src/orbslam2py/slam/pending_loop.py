@@ -63,7 +63,7 @@ class PendingLoop:
         Parameters
         ----------
         found : Loop or None
-            What this keyframe found.
+            The loop of this keyframe, or None.
         """
         self._follow_map()
         self._consider(found)

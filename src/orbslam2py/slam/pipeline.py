@@ -72,7 +72,7 @@ class Pipeline:
     setup : Setup
         Camera, visual words and the initial map; with a map, tracking starts lost and searches it.
     options : SystemOptions
-        How to work.
+        Options of the system.
     callbacks : Callbacks
         Receives events.
 
@@ -85,7 +85,7 @@ class Pipeline:
     localization : LocalizationSwitch
         Whether the map stays as it is.
     recorder : FrameRecorder
-        Where every frame was.
+        Poses of all frames.
     keeper : MapAutosave
         The map in files.
     reset_requested : threading.Event

@@ -14,7 +14,7 @@ from orbslam2py._arrays import EqualByValue, FloatArray, IntArray
 
 
 class TrackingState(enum.IntEnum):
-    """State of the tracker after an image."""
+    """State of tracking after an image; ``docs/method/tracking.md#state`` has the transitions."""
 
     NO_IMAGES_YET = 0
     NOT_INITIALIZED = 1
@@ -67,7 +67,7 @@ class Verdict(str, enum.Enum):
 
 
 class PoseMethod(str, enum.Enum):
-    """What found a pose."""
+    """The method that found a pose."""
 
     MOTION_MODEL = "motion model"
     REFERENCE_KEYFRAME = "reference keyframe"
@@ -94,7 +94,7 @@ class Evidence:
 
     verdict: Verdict
     method: PoseMethod
-    """What found the pose."""
+    """The method that found the pose."""
     doubted: bool
     """The evidence of the first pose fell so suddenly that other methods searched the pose too."""
     confirmed: bool
@@ -261,7 +261,7 @@ class PoseEstimate:
     relocalized: bool = False
     """Found without a prediction from the frame before."""
     method: PoseMethod = PoseMethod.MOTION_MODEL
-    """What found it."""
+    """The method that found it."""
     evidence: Evidence | None = None
     """See `TrackingRecord.evidence`."""
     by_image: core.Pose | None = None

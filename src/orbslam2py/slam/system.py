@@ -373,8 +373,8 @@ class System:
         Raises
         ------
         StateError, ImageError, WorkerError
-            As for `track_stereo`; also if the source is for another sensor. What was tracked
-            before stays in the map and the trajectory.
+            As for `track_stereo`; also if the source is for another sensor. The frames tracked
+            before remain in the map and the trajectory.
         DatasetError
             If a file is missing.
         """

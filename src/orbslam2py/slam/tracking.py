@@ -67,13 +67,13 @@ class Tracking:
     mapping : LocalMapping
         Takes the keyframes.
     initializer : Initializer
-        How a map begins.
+        The initializer.
     search : PoseSearch
         Estimates poses.
     acceptance : PoseAcceptance
         Validates poses.
     keyframe_decision : KeyframeDecision
-        Which frames become keyframes.
+        The decision whether a frame becomes a keyframe.
     config : Config
         Thresholds.
     has_depth : bool

@@ -72,7 +72,7 @@ def write_bag(
     Parameters
     ----------
     contents
-        What to write.
+        The contents of the bag.
     folder
         An existing folder.
     layout

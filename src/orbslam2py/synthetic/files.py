@@ -50,7 +50,7 @@ class WritableSequence(Sequence, Protocol):
     Attributes
     ----------
     options
-        What was asked for.
+        The options.
     camera
         The camera; both cameras of a pair are equal.
     baseline

@@ -102,7 +102,7 @@ _DOOR_PERIOD, _DOOR_SLIDES = 8.0, 1.5  # seconds
 
 
 def make_lift(seed: int) -> core.World:
-    """A wall with the opening of a lift and its cabin; the door is a part of its own."""
+    """A wall with the opening of a lift and its cabin; the door is a separate part."""
     textures = iter(_textures(seed, 4, 12))
     x, top, bottom, z = _DOOR_HALF, _DOOR_TOP, _DOOR_BOTTOM, _WALL_AHEAD
     back = z + _CABIN_DEEP

@@ -72,11 +72,11 @@ class Motion:
     Parameters
     ----------
     kind
-        Which.
+        Options of the workers.
     fps
         Frames per second: they determine the speed of sudden turns.
     seed
-        Of the draws.
+        Seed of the random numbers.
     """
 
     def __init__(self, kind: SyntheticMotion, fps: float, seed: int) -> None:

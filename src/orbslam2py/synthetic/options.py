@@ -29,9 +29,9 @@ class SyntheticOptions:
     Attributes
     ----------
     world
-        Where the camera moves.
+        The world.
     sensor
-        What delivers the images.
+        The sensor.
     frames
         Number of images; by default the whole path.
     laps
@@ -58,7 +58,7 @@ class SyntheticOptions:
         Standard deviation of the grey values' noise, grey levels.
     exposure
         Factor on the grey values. Two numbers: the factor jumps between frames, about once a
-        second, and lies between them.
+        second, and is between them.
     blur
         Exposure time, in times between two frames (0 to 1): the camera's motion during it blurs the
         image. The ground truth is the pose in the middle of the exposure.

@@ -36,7 +36,7 @@ def arrange(options: SyntheticOptions, n_images: int, fps: float) -> Arrangement
     options
         Parts, their order, gap and overlap.
     n_images
-        Of the whole way.
+        Number of images of the whole path.
     fps
         Images per second.
 

@@ -62,7 +62,7 @@ class TrajectoryFile:
     trajectory
         The poses, with times in seconds.
     file_format
-        What the file is.
+        Format of the file.
     reading
         The conventions of its numbers.
     """
@@ -151,7 +151,7 @@ def read_trajectory(
         Trajectory; its times are numbers of frames for KITTI, and its poses those of the body for
         EuRoC.
     TrajectoryFormat
-        What the file is.
+        Format of the file.
 
     Raises
     ------

@@ -17,7 +17,7 @@ class TrajectoryLayout:
     Attributes
     ----------
     name
-        What it is called.
+        Its name, for the message.
     written_by
         Data sets and programs that write it.
     description

@@ -64,7 +64,7 @@ def columns_of(table: TextTable, file_format: TrajectoryFormat) -> Columns:
 
 
 def no_trajectory(table: TextTable) -> DatasetError:
-    """Return what the first line of a file is, if it is no trajectory."""
+    """Return a description of the first line of a file that is no trajectory."""
     head = next((head for head in table.heads if not head.is_comment), None)
     row = table.rows[0] if table.rows else None
     if head is not None and not (row and any(is_number(field) for field in row.fields)):

@@ -25,7 +25,7 @@ class ActionsOnSystem:
     system : System
         The system.
     folder : Path
-        Where maps are saved.
+        The folder of saved maps.
     """
 
     def __init__(self, system: System, folder: Path) -> None:

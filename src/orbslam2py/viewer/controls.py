@@ -157,7 +157,7 @@ class SystemControls:
     server : viser.ViserServer
         The page.
     actions : SystemActions
-        What is asked for.
+        The requests.
     """
 
     def __init__(self, server: viser.ViserServer, actions: SystemActions) -> None:

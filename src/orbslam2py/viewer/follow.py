@@ -21,10 +21,10 @@ _TURN = 0.25
 
 
 class Follow(str, Enum):
-    """How the view moves."""
+    """Mode of the view."""
 
     FREE = "free"
-    """By the mouse alone."""
+    """Controlled only by the mouse."""
     BEHIND = "from behind"
     ABOVE = "from above"
 
@@ -38,7 +38,7 @@ class Follower:
     Attributes
     ----------
     mode : Follow
-        How.
+        The mode.
     distance : float
         Distance factor, 1 by default.
     """

@@ -57,7 +57,7 @@ class LiveView:
     port : int, optional
         The port, which must be free; by default 8080 or the next free one.
     title : str
-        What is seen, for the head of the page.
+        Title of the page.
     stand_back : bool
         Use only idle time of the processor, if the system supports this (Linux): for images in real
         time. If all cores are busy, little is shown.
@@ -119,15 +119,15 @@ class LiveView:
         Parameters
         ----------
         system : System
-            What the buttons ask.
+            The requests of the buttons.
         truth : Trajectory, optional
             Ground truth, drawn with the estimated trajectory.
         control : RunActions, optional
             Control that can pause the run, if it is recorded.
         stop : callable, optional
-            What ends the run.
+            The stop event of the run.
         folder : path
-            Where maps are saved.
+            The folder of saved maps.
 
         Raises
         ------
@@ -262,7 +262,7 @@ class Viewer:
     Parameters
     ----------
     system : System
-        What to show.
+        The system to show.
     host : str
         Address of this computer to listen at. Anybody who can reach it sees the images and can use
         the buttons.

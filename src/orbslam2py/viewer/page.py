@@ -39,11 +39,11 @@ class Page:
     Parameters
     ----------
     host : str
-        Where it is served.
+        Address of the page.
     port : int, optional
         See `start_server`.
     title : str
-        For its head.
+        Title of the page.
     on_client : callable
         Called for each new browser, in a separate thread.
 

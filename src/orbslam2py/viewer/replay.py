@@ -38,7 +38,7 @@ class Replay:
     Parameters
     ----------
     run : RunFolder
-        What to show.
+        The system to show.
     sequence : Sequence, optional
         Its images and ground truth, which are not in the folder.
     host, port

@@ -30,7 +30,7 @@ Progress = Callable[[float], object]
 
 
 class VocabularyFormat(str, Enum):
-    """The format of a file, whatever its name."""
+    """The format of a file, independent of its name."""
 
     BINARY = "binary"
     TEXT = "text"

@@ -74,8 +74,7 @@ def train_vocabulary(
     Returns
     -------
     Vocabulary or None
-        Equal for equal images, options and seed, whatever the number of threads. None when
-        cancelled.
+        Equal for equal images, options and seed, with any number of threads. None when cancelled.
 
     Raises
     ------

@@ -40,7 +40,7 @@ class Entry:
     Attributes
     ----------
     sequence, sensor
-        What was run.
+        Sequence and sensor.
     rows
         Rows of the table, one for each seed, in their order.
     published
@@ -62,7 +62,7 @@ class Entry:
         return Spread.of([row for row in self.rows if not is_lost(row)], figure)
 
     def of(self, system: str) -> Published | None:
-        """Return what is published of a system."""
+        """Return the published figures of a system."""
         return next((one for one in self.published if one.system == system), None)
 
 

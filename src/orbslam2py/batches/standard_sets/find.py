@@ -73,7 +73,7 @@ def find_sequences(kind: StandardSet | str, root: Path) -> dict[str, Path]:
     kind
         Which data set; sequences of others are ignored.
     root
-        Where to look.
+        The folder to search.
 
     Returns
     -------

@@ -21,7 +21,7 @@ class Compared:
     name: str
     unit: str
     key: str
-    """In reports."""
+    """Its name in reports."""
     digits: int
     """Of ours."""
     printed: int

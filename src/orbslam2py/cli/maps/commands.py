@@ -109,7 +109,7 @@ def compact(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a map file anew, as small as it can be, without what autosaving left in it."""
+    """Write a map file again with the smallest size, without the remains of autosaving."""
     saved = load_map(file, images=not without_images)
     if without_images:
         saved = replace(saved, images={})

@@ -89,9 +89,10 @@ def crop(
 ) -> None:
     """Keep a part of a map: the keyframes of a time, or whose cameras stood in a box.
 
-    What these see is kept, too; a point that loses observations goes if what is left does not hold
-    it. If the first keyframe goes, the next becomes the one that paths are relative to. Other maps
-    of the file stay as they are; --only leaves them out, and alone takes one map out of several.
+    The points that these observe are kept, too; a point that loses observations is removed if the
+    remaining ones do not suffice. If the first keyframe goes, the next becomes the one that paths
+    are relative to. Other maps of the file stay as they are; --only leaves them out, and alone
+    takes one map out of several.
     """
     by_time, by_box = not (begin is None and end is None), not (low is None and high is None)
     if by_time == by_box and not (only and not by_time):

@@ -38,8 +38,8 @@ def merge(
 ) -> None:
     """Make one map of maps of different runs, as far as they show the same places.
 
-    The world and the scale of the first stay. What shows no common place stays a map of its own in
-    the same file.
+    The world and the scale of the first stay. A map without a common place remains a separate map
+    in the same file.
     """
     if len(files) < 2:
         raise MapFileError(f"{files[0]} alone cannot be merged; name two map files or more")

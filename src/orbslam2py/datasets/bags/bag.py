@@ -63,7 +63,7 @@ class Topic:
 
 @dataclass(frozen=True, order=True)
 class Message:
-    """Where a message is."""
+    """The position of a message."""
 
     recorded: int
     """Time of recording, nanoseconds."""

@@ -39,7 +39,7 @@ _ADVICE = "give the calibration with --settings"
 
 @dataclass(frozen=True, eq=False)
 class CameraInfo:
-    """What a CameraInfo tells.
+    """The contents of a CameraInfo.
 
     Attributes
     ----------

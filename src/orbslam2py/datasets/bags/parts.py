@@ -57,7 +57,7 @@ class Place(NamedTuple):
 
 
 class BagFile(Protocol):
-    """One file of a bag, whatever its kind.
+    """One file of a bag, of any kind.
 
     Attributes
     ----------

@@ -85,7 +85,7 @@ def decode_image(
     message
         Image or CompressedImage.
     compressed
-        Which of the two.
+        Whether it is a CompressedImage.
     rgb
         Whether the order of colours is RGB (True) or BGR.
     to_8_bits

@@ -163,7 +163,7 @@ class BagSequence(FramesInOrder):
         return None if topic is None else read_poses(self._bag, topic)
 
     def imu(self) -> ImuSamples | None:
-        """Read the samples of the IMU, each time anew; None if the bag has none.
+        """Read the samples of the IMU at each call; None if the bag has none.
 
         Raises
         ------

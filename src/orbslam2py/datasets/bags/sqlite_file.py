@@ -145,7 +145,7 @@ class SqliteFile:
             self.doubts.append(f"is damaged: {named} without a name or a type, left out")
 
     def _list_messages(self) -> None:
-        """Store time and row of each message, as far as the database can be read."""
+        """Store time and row of each message that can be read."""
         query = "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
         untimed = 0
         try:

@@ -35,7 +35,7 @@ class TimedMessages:
     nanoseconds
         When each was taken.
     messages
-        Where each is.
+        Positions of the messages.
     sizes
         Number of images of each size; empty if they are compressed.
     frame

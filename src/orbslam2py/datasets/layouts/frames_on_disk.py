@@ -32,7 +32,7 @@ class DepthSequence(RecordedSequence):
     Parameters
     ----------
     folder
-        Where the images are.
+        The folder of the sequence.
     sensor
         RGB-D or monocular; by default RGB-D if there is depth.
     settings

@@ -41,7 +41,7 @@ def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
     Parameters
     ----------
     saved
-        What the file holds.
+        The map file's contents.
     number
         Its number, from 0 for the oldest; not needed if there is only one.
 
@@ -76,7 +76,7 @@ def crop_among_others(
     Parameters
     ----------
     saved
-        What the file holds.
+        The map file's contents.
     number
         Which map.
     kept
@@ -129,7 +129,7 @@ def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:
     Parameters
     ----------
     saved
-        What the file holds.
+        The map file's contents.
     number
         Number of the map in the file (`take_map`).
     edited

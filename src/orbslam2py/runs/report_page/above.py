@@ -64,7 +64,7 @@ class Window:
         return per_length * (flat[:, 0] - self.low[0]), per_length * (self.high[1] - flat[:, 1])
 
     def inside(self, flat: FloatArray) -> FloatArray:
-        """Only what is seen."""
+        """Only the visible part."""
         return flat[np.all((flat > self.low) & (flat < self.high), axis=1)]
 
 

@@ -19,7 +19,7 @@ class Figure:
     name: str
     unit: str
     text: str
-    """What it is."""
+    """Description of the figure."""
     best: int = 0
     """1: larger is better, -1: smaller is better, 0: neither."""
 

@@ -105,7 +105,7 @@ class RunFolder:
 
     @property
     def sensor(self) -> Sensor:
-        """What delivered the images.
+        """The sensor.
 
         Raises
         ------

@@ -75,7 +75,7 @@ class MultiHypothesisSearch:
             The hypothesis with the strongest evidence: `first`, unless another one is clearly
             better; None if nothing was found.
         State
-            As relocalization leaves it.
+            The state after relocalization.
         """
         found = [] if first is None else [first]
         for method, way in self._ways(state):

@@ -48,7 +48,7 @@ class PoseValidator:
         state : State
             The state before the frame.
         method : PoseMethod
-            What found the pose.
+            The method that found the pose.
         """
         frame, estimate = refined.frame, refined.estimate
         spread = refined.spread

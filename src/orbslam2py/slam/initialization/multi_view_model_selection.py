@@ -44,7 +44,7 @@ class _Sightings:
     rows
         Mask of the keypoints with a match in this view, (n,).
     pixels
-        Where, (n, 2).
+        Pixels of the keypoints, (n, 2).
     inverse_sigma2
         Weights by the keypoints' levels, (n,) [px^-2].
     """

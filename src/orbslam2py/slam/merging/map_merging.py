@@ -206,7 +206,7 @@ class MapMerging:
         Parameters
         ----------
         loop : Loop
-            What `choose` gave.
+            The result of `choose`.
         timer : StageTimer
             Measures the time of each step.
         cancelled : StopFlag

@@ -131,7 +131,7 @@ class LocalMapSearch:
         Parameters
         ----------
         refined : RefinedPose
-            Where the search begins. It is not changed.
+            Initial pose of the search. It is not changed.
         in_doubt : bool
             Whether the pose had few or wrong matches: then any result of the search is accepted.
 

@@ -69,9 +69,9 @@ class AmbiguityCheck:
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            With pose and associations.
+            The frame, with pose and associations.
         keyframe : int
-            Where.
+            The place.
         candidates : sequence of Candidate
             All keyframes that the frame was compared with.
 

@@ -35,7 +35,7 @@ class CandidatePlaces:
         Parameters
         ----------
         frame : orbslam2py._core.Frame
-            With its words.
+            The frame, with its words.
         lost : LostSearch
             Where tracking was lost, and the searches since then.
 

@@ -72,7 +72,7 @@ class LastKnownPose:
 
 @dataclass(frozen=True, eq=False)
 class LostSearch:
-    """What relocalization carries from one lost frame to the next."""
+    """State of relocalization between two lost frames."""
 
     place: LastKnownPose | None = None
     """Where tracking was lost; None if it is not lost, or was lost in another map."""

@@ -58,7 +58,7 @@ class State:
     """In localization mode: the last pose depends on the depths of the frame before it."""
 
     lost: LostSearch = field(default_factory=LostSearch)
-    """What relocalization carries from frame to frame."""
+    """State of relocalization between two lost frames."""
     lost_time: LostTime = field(default_factory=LostTime)
     """Since when tracking is lost."""
     n_lost: int = 0

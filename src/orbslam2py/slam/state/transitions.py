@@ -155,7 +155,7 @@ class Transitions:
         state : State
             The state before it.
         event : Event
-            What has happened.
+            The event.
         """
         after, actions = state, _NOTHING
         match event:

@@ -55,7 +55,7 @@ class Companion:
     Attributes
     ----------
     address : str
-        Where its page is.
+        Address of the page.
     ended : threading.Event
         Set after its end.
 
