@@ -17,8 +17,8 @@ struct SurfacePatch {
 };
 
 /// The plane through the point at depth `z` [m] behind `pixel`, parallel to the image plane, or for
-/// a fisheye lens across the ray: the assumption while the normal is not known. `pixel` is raw: of the image, not of the undistorted
-/// plane. None when a number is not finite or `z` is not above 0.
+/// a fisheye lens across the ray: the assumption while the normal is not known. `pixel` is raw: of
+/// the image, not of the undistorted plane. None when a number is not finite or `z` is not above 0.
 std::optional<SurfacePatch> parallel_patch(const Camera& camera, const Pose& T_wc,
                                            const Eigen::Vector2d& pixel, double z);
 

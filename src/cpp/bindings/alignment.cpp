@@ -157,10 +157,13 @@ void bind_map_alignment(py::module_& module) {
             align_keyframes(map, keyframe, noise, patches_only, n_threads);
         return std::make_pair(done.n_patches, done.counts);
       },
-      "map"_a, "keyframe"_a, "noise"_a = 0.0, "patches_only"_a = false, "n_threads"_a = 1, Release(),
+      "map"_a, "keyframe"_a, "noise"_a = 0.0, "patches_only"_a = false, "n_threads"_a = 1,
+      Release(),
       "Align sightings to the patches of their points, in a new keyframe and in its neighbours\n"
-      "that keep their images; cut the patches that are missing. `noise`: standard deviation of an\n"
-      "aligned sighting over that of a corner; 0: as patches and adjustments say. Returns (number of new patches,\n"
+      "that keep their images; cut the patches that are missing. `noise`: standard deviation of "
+      "an\n"
+      "aligned sighting over that of a corner; 0: as patches and adjustments say. Returns (number "
+      "of new patches,\n"
       "sightings tried by AlignmentFailure).");
   module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, "noise"_a = 0.0, Release(),
              "Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the\n"

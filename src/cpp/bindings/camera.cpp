@@ -141,7 +141,8 @@ void bind_camera_options(py::module_& module) {
            py::arg("depth_ratio") = 0.0, py::arg("model") = nullptr,
            py::arg("right_centre") = Eigen::Vector3d(Eigen::Vector3d::Zero()),
            "`model`: a CameraModel in place of fx, fy, cx, cy and distortion. `right_centre`: of\n"
-           "the right camera of a fisheye pair, in this camera's frame [m], in place of bf. Nothing\n"
+           "the right camera of a fisheye pair, in this camera's frame [m], in place of bf. "
+           "Nothing\n"
            "is checked before a Camera is made.")
       .def_property(
           "distortion", [](const CameraOptions& o) { return o.distortion; },

@@ -212,12 +212,14 @@ void bind_filter(py::module_& module) {
           },
           "scale"_a, "pose"_a,
           "The map was moved: `x' = scale R x + t`. Tilt and scale are 0 afterwards.")
-      .def_property_readonly("T_wb", [](const F& f) { return f.state().T_wb; },
-                             "Pose of the IMU in the world.")
-      .def_property_readonly("velocity", [](const F& f) { return f.state().velocity; },
-                             "Of the IMU in the world (3,) [m/s].")
-      .def_property_readonly("bias", [](const F& f) { return to_vector(f.bias()); },
-                             "(6,): gyro [rad/s], accelerometer [m/s^2].")
+      .def_property_readonly(
+          "T_wb", [](const F& f) { return f.state().T_wb; }, "Pose of the IMU in the world.")
+      .def_property_readonly(
+          "velocity", [](const F& f) { return f.state().velocity; },
+          "Of the IMU in the world (3,) [m/s].")
+      .def_property_readonly(
+          "bias", [](const F& f) { return to_vector(f.bias()); },
+          "(6,): gyro [rad/s], accelerometer [m/s^2].")
       .def_property_readonly("tilt", &F::tilt,
                              "Rotation [rad] about the first two axes of the world from "
                              "(0, 0, -9.81) to gravity (2,).")
@@ -255,8 +257,9 @@ void bind_start(py::module_& module) {
       .def_readonly("gravity_length", &S::gravity_length,
                     "Its length if it is not known to be 9.81: a check.")
       .def_readonly("scale", &S::scale, "Metres per unit of the map.")
-      .def_property_readonly("bias", [](const S& s) { return to_vector(s.bias); },
-                             "(6,): gyro [rad/s], accelerometer [m/s^2].")
+      .def_property_readonly(
+          "bias", [](const S& s) { return to_vector(s.bias); },
+          "(6,): gyro [rad/s], accelerometer [m/s^2].")
       .def_readonly("velocities", &S::velocities,
                     "Of the IMU at the views, (3,) each [m/s], in the axes of the map.")
       .def_readonly("scale_deviation", &S::scale_deviation, "Of the logarithm of the scale.")

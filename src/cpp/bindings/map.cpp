@@ -228,8 +228,7 @@ void bind_parts(MapClass& map) {
       .def("is_upright", reader(&Map::is_upright), "map"_a, Release(),
            "Whether the third axis of the map's world is up, by an IMU, and its unit is the metre. "
            "Trajectories of other maps are relative to their first keyframe.")
-      .def("set_upright", writer(&Map::set_upright), "map"_a, Release(),
-           "Note that it is so.")
+      .def("set_upright", writer(&Map::set_upright), "map"_a, Release(), "Note that it is so.")
       .def("begin_map", writer(&Map::begin_map), Release(),
            "The next keyframe begins a map, which becomes the active one; its number. Nothing\n"
            "changes while the active one has no keyframe.")
@@ -383,7 +382,8 @@ void bind_local_map(py::module_& module) {
         transform_map(map, which, Similarity(scale, pose.rotation(), pose.translation()));
       },
       "map"_a, "which"_a, "scale"_a, "pose"_a, Release(),
-      "Move all keyframes and points of a map: `x' = scale R x + t` with R, t of the pose. Counts as "
+      "Move all keyframes and points of a map: `x' = scale R x + t` with R, t of the pose. Counts "
+      "as "
       "a big change; nobody may work on the map meanwhile.");
   module.def("select_local_map", &select_local_map, "map"_a, "frame"_a, Release(),
              "Keyframes voted for by the frame's points, extended, and all their points.");

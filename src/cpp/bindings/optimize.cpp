@@ -318,7 +318,8 @@ void bind_local_bundle(py::module_& module) {
       "measures_noise"_a = false,
       "Refine a keyframe, its neighbours and all their points; other observers are fixed.\n\n"
       "`abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for\n"
-      "the scale. `solver`: of BundleOptions. `inertial`: InertialKeyframes, whose newest ones are\n"
+      "the scale. `solver`: of BundleOptions. `inertial`: InertialKeyframes, whose newest ones "
+      "are\n"
       "local, too, with residuals of the IMU between them; or None. `measures_noise`:\n"
       "alignment_noise() follows the residuals of aligned sightings. Takes the map's locks for\n"
       "short sections only. A\n"

@@ -53,8 +53,8 @@ void bind_rectifier(py::module_& module) {
              return std::make_shared<Rectifier>(raw, R, Pinhole{fx, fy, cx, cy},
                                                 ImageSize{width, height});
            }),
-           py::arg("raw"), py::arg("R"), py::arg("fx"), py::arg("fy"), py::arg("cx"),
-           py::arg("cy"), py::arg("width"), py::arg("height"),
+           py::arg("raw"), py::arg("R"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
+           py::arg("width"), py::arg("height"),
            "R (3, 3) turns raw into rectified camera coordinates; the others are of the rectified\n"
            "camera [px]. Raises SettingsError when they are out of range.")
       .def(
@@ -122,7 +122,8 @@ void bind_raw_pairs(py::module_& module) {
            }),
            py::arg("left").none(false), py::arg("right"), py::arg("R_right_left"),
            py::arg("t_right_left"),
-           "`left` was made with right_centre; R (3, 3) and t (3,) [m] take left camera coordinates\n"
+           "`left` was made with right_centre; R (3, 3) and t (3,) [m] take left camera "
+           "coordinates\n"
            "into right ones. Raises SettingsError when the centres differ.")
       .def(
           "match",

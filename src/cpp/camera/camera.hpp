@@ -106,15 +106,16 @@ class Camera {
   Eigen::Vector2d raw_error(const Eigen::Vector2d& difference, double u, double v) const {
     return distorts_ ? Eigen::Vector2d(raw_by_plane(u, v) * difference) : difference;
   }
-  /// Error of a point's (virtual) right column against that of a keypoint at (u, v), given the error
-  /// of its pixel.
+  /// Error of a point's (virtual) right column against that of a keypoint at (u, v), given the
+  /// error of its pixel.
   double right_error(const Eigen::Vector3d& p_c, const Eigen::Vector2d& error, double u, double v,
                      double right_u) const {
     if (flat_) return error.x() + (u - right_u) - options_.bf / p_c.z();
     const Eigen::Vector3d q = sight(u, v) * p_c;
     return q.x() / q.z() + (u - right_u) - options_.bf / q.z();
   }
-  /// The part of a pixel error at (u, v) along the line on which the right camera sees the keypoint.
+  /// The part of a pixel error at (u, v) along the line on which the right camera sees the
+  /// keypoint.
   double along_epipolar_curve(const Eigen::Vector2d& error, double u, double v) const {
     return wide_pair_ ? along_curve_of_pair(error, u, v) : error.x();
   }

@@ -35,7 +35,8 @@ struct Frame {
   /// Red, green, blue of the image at each keypoint; empty when the image was grey.
   std::vector<std::array<std::uint8_t, 3>> colours;
   KeypointGrid grid;
-  /// Of each right column that was aligned (frame/right_alignment.hpp), else 0 [px^2]; may be empty.
+  /// Of each right column that was aligned (frame/right_alignment.hpp), else 0 [px^2]; may be
+  /// empty.
   std::vector<float> right_variance;
   std::shared_ptr<FrameImages> images;  ///< null: nobody aligns patches in this frame
   SmallImage small_image;  ///< of the image, the left one of a pair; empty when nobody kept it

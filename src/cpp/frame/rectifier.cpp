@@ -64,8 +64,8 @@ Rectifier::Rectifier(CameraModel raw, const Eigen::Matrix3d& R, const Pinhole& p
         const Eigen::Vector2d& uv = seen.uv;
         if (!(uv.cwiseAbs().maxCoeff() < -static_cast<double>(kNowhere))) continue;
         line[column] = {static_cast<float>(uv.x()), static_cast<float>(uv.y())};
-        sees_any |= uv.x() >= 0 && uv.y() >= 0 && uv.x() < raw_size.width &&
-                    uv.y() < raw_size.height;
+        sees_any |=
+            uv.x() >= 0 && uv.y() >= 0 && uv.x() < raw_size.width && uv.y() < raw_size.height;
       }
     }
   });
@@ -142,8 +142,8 @@ cv::Mat Rectifier::rectify_grey(const cv::Mat& image) const {
   const std::ptrdiff_t stride = image.cols;
   const std::size_t n = grey_.offsets.size(), whole = n - n % 8;
   for (std::size_t i = 0; i < whole; i += 8) {
-    const EightBytes eight = resample(from, stride, &grey_.offsets[i], load(&grey_.right[i]),
-                                      load(&grey_.down[i]));
+    const EightBytes eight =
+        resample(from, stride, &grey_.offsets[i], load(&grey_.right[i]), load(&grey_.down[i]));
     std::memcpy(to + i, &eight, sizeof(eight));
   }
   for (std::size_t i = whole; i < n; ++i) {

@@ -14,7 +14,8 @@
 namespace orbslam {
 
 /// Makes the images of one raw camera those of a pinhole that is turned against it: one camera of a
-/// pair whose rows shall correspond. Maps are in 1/32 pixel, results are those of cv::remap. See docs/method/frame.md#rectification.
+/// pair whose rows shall correspond. Maps are in 1/32 pixel, results are those of cv::remap. See
+/// docs/method/frame.md#rectification.
 class Rectifier {
  public:
   /// `R` turns raw into rectified camera coordinates, `plane` is the rectified camera, `size` that

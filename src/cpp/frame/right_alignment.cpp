@@ -84,8 +84,8 @@ int align_right_columns(Frame& frame, double bf, double max_disparity) {
   int n_aligned = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     const float disparity = frame.keypoints[i].x - aligned[i].right_u;
-    const bool usable = aligned[i].variance > 0 && disparity > 0 &&
-                        disparity < static_cast<float>(max_disparity);
+    const bool usable =
+        aligned[i].variance > 0 && disparity > 0 && disparity < static_cast<float>(max_disparity);
     if (!usable) continue;
     frame.right_u[i] = aligned[i].right_u;
     frame.depth[i] = static_cast<float>(bf) / disparity;

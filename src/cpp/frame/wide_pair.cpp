@@ -112,12 +112,8 @@ class WidePair::Search {
     const auto at = right_direction({keypoint.x, keypoint.y});
     if (!at || at->sine < kLeastSine) return;
     const double pixels = kCurveBand * static_cast<double>(scales_.scale(keypoint.level));
-    Candidate candidate{at->plane,
-                        at->angle,
-                        pixels / (at->across * at->sine),
-                        pixels / at->along,
-                        keypoint.level,
-                        index};
+    Candidate candidate{at->plane,          at->angle,      pixels / (at->across * at->sine),
+                        pixels / at->along, keypoint.level, index};
     widest_ = std::max(widest_, candidate.tolerance);
     candidates_.push_back(candidate);
     // Planes are a circle: those near its seam are listed on both sides.
@@ -176,23 +172,21 @@ class WidePair::Search {
     if (!pair_.right_.project(pair_.T_rl_ * (depth * ray), seen)) return std::nullopt;
     // The patch is a piece of a sphere around the left camera.
     const Eigen::Matrix2d warp = seen.J * pair_.R_rl_ * (depth * ray_by_pixel(J_left));
-    const auto to = static_cast<std::size_t>(std::min<int>(
-        warped_level(scales_, keypoint.level, warp),
-        static_cast<int>(right_.pyramid.levels.size()) - 1));
+    const auto to =
+        static_cast<std::size_t>(std::min<int>(warped_level(scales_, keypoint.level, warp),
+                                               static_cast<int>(right_.pyramid.levels.size()) - 1));
     const Eigen::Matrix2d A = level_scale(right_places_[to]).cwiseInverse().asDiagonal() * warp *
                               level_scale(left_places_[from]).asDiagonal();
     const Keypoint& right = right_.features.keypoints[match.index];
-    const PatchAlignment aligned =
-        align_patch(patch, A, right_.pyramid.levels[to],
-                    in_level(right_places_[to], {right.x, right.y}));
+    const PatchAlignment aligned = align_patch(patch, A, right_.pyramid.levels[to],
+                                               in_level(right_places_[to], {right.x, right.y}));
     if (!aligned.ok()) return std::nullopt;
     const Eigen::Vector2d pixel(
         right_places_[to].x.to_image(static_cast<float>(aligned.position.x())),
         right_places_[to].y.to_image(static_cast<float>(aligned.position.y())));
     const auto found = right_direction(pixel);
     if (!found) return std::nullopt;
-    const double beside =
-        std::abs(wrapped(found->plane - at.plane)) * found->sine * found->across;
+    const double beside = std::abs(wrapped(found->plane - at.plane)) * found->sine * found->across;
     if (beside > kCurveBand * static_cast<double>(scales_.scale(static_cast<int>(to)))) {
       return std::nullopt;
     }
@@ -254,14 +248,16 @@ StereoMatches WidePair::match(const Extraction& left, const Extraction& right,
   const std::size_t n = left.features.size();
   StereoMatches matches{std::vector<float>(n, kNoDepth), std::vector<float>(n, kNoDepth)};
   const Search search(*this, left, right, scales);
-  for_each_in_parallel((n + kKeypointsPerTask - 1) / kKeypointsPerTask, threads_for(2), [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kKeypointsPerTask; i < std::min(n, (chunk + 1) * kKeypointsPerTask); ++i) {
-      const auto found = search.depth_of(i);
-      if (!found) continue;
-      matches.depth[i] = static_cast<float>(found->first);
-      matches.right_u[i] = left.features.keypoints[i].x - static_cast<float>(found->second);
-    }
-  });
+  for_each_in_parallel(
+      (n + kKeypointsPerTask - 1) / kKeypointsPerTask, threads_for(2), [&](std::size_t chunk) {
+        for (std::size_t i = chunk * kKeypointsPerTask;
+             i < std::min(n, (chunk + 1) * kKeypointsPerTask); ++i) {
+          const auto found = search.depth_of(i);
+          if (!found) continue;
+          matches.depth[i] = static_cast<float>(found->first);
+          matches.right_u[i] = left.features.keypoints[i].x - static_cast<float>(found->second);
+        }
+      });
   return matches;
 }
 

@@ -21,9 +21,8 @@ ImuResidual imu_residual(const Preintegration& motion, const ImuState& first, co
 
   const Eigen::Quaterniond between = first.T_wb.rotation().conjugate() * second.T_wb.rotation();
   const Eigen::Vector3d dv = R_bw * (second.velocity - first.velocity - dt * gravity);
-  const Eigen::Vector3d dp =
-      R_bw * (second.T_wb.translation() - first.T_wb.translation() - dt * first.velocity -
-              0.5 * dt * dt * gravity);
+  const Eigen::Vector3d dp = R_bw * (second.T_wb.translation() - first.T_wb.translation() -
+                                     dt * first.velocity - 0.5 * dt * dt * gravity);
   ImuResidual result;
   const Eigen::Vector3d rotation = so3_log((dR.conjugate() * between).normalized());
   result.error << rotation, dv - motion.motion().dv - by_change.segment<3>(3),

@@ -155,7 +155,8 @@ double InertialFilter::distance(const Pose& T_cw, const Matrix6d& covariance) co
 void InertialFilter::move(const Pose& T_cw) {
   const Pose T_wb = T_cw.inverse() * T_cb_;
   // Turns what is fixed to the map; the body stays as it is.
-  const Eigen::Quaterniond turn = (T_wb.rotation() * state_.T_wb.rotation().conjugate()).normalized();
+  const Eigen::Quaterniond turn =
+      (T_wb.rotation() * state_.T_wb.rotation().conjugate()).normalized();
   const Eigen::Matrix3d R = turn.toRotationMatrix();
   Covariance A = Covariance::Identity();
   A.block<3, 3>(kVelocity, kVelocity) = R;

@@ -25,8 +25,15 @@ class InertialFilter {
  public:
   static constexpr int kSize = 18;
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
-  enum At { kRotation = 0, kVelocity = 3, kPosition = 6, kGyro = 9, kAccel = 12, kTilt = 15,
-            kScale = 17 };
+  enum At {
+    kRotation = 0,
+    kVelocity = 3,
+    kPosition = 6,
+    kGyro = 9,
+    kAccel = 12,
+    kTilt = 15,
+    kScale = 17
+  };
 
   /// `T_cb` maps coordinates of the IMU into those of the camera. The world's third axis is up.
   InertialFilter(const Pose& T_cb, const ImuNoise& noise, const ImuState& state,
@@ -51,8 +58,8 @@ class InertialFilter {
 
   /// The map was moved: the camera's pose is this one now, and velocity and errors turn with it.
   void move(const Pose& T_cw);
-  /// The map was turned and scaled: `x' = factor * (rotation x) + shift`. The tilt and scale that it
-  /// corrects are taken from the means: both are 0 afterwards, their deviations stay.
+  /// The map was turned and scaled: `x' = factor * (rotation x) + shift`. The tilt and scale that
+  /// it corrects are taken from the means: both are 0 afterwards, their deviations stay.
   void transform(const Eigen::Quaterniond& rotation, double factor, const Eigen::Vector3d& shift);
 
   const ImuState& state() const { return state_; }

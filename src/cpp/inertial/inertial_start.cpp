@@ -54,8 +54,8 @@ class Problem {
       Eigen::Vector3d b = weight * (options_.bias.gyro - bias_.gyro);
       const double rotation = options_.rotation_deviation;
       for (std::size_t i = 0; i < motions_.size(); ++i) {
-        const Eigen::Quaterniond off = motions_[i].motion().dR.conjugate() *
-                                       rotations_[i].conjugate() * rotations_[i + 1];
+        const Eigen::Quaterniond off =
+            motions_[i].motion().dR.conjugate() * rotations_[i].conjugate() * rotations_[i + 1];
         const Eigen::Matrix3d J = motions_[i].by_bias().topLeftCorner<3, 3>();
         H += J.transpose() * J / (2 * rotation * rotation);
         b += J.transpose() * so3_log(off.normalized()) / (2 * rotation * rotation);
@@ -142,8 +142,8 @@ class Problem {
     start.bias = bias_;
     start.velocities = velocities_;
     start.cost = cost_;
-    start.freedom = static_cast<int>(9 * (n - 1) + 6 * n + 6 - (common + kCommon) +
-                                     (options_.metric ? 1 : 0));
+    start.freedom =
+        static_cast<int>(9 * (n - 1) + 6 * n + 6 - (common + kCommon) + (options_.metric ? 1 : 0));
     start.up = turn_up(gravity_);
     start.scale_deviation =
         options_.metric ? 0 : std::sqrt(std::max(0.0, P(kView + kScaleAt, kView + kScaleAt)));
@@ -198,8 +198,8 @@ class Problem {
       add(i * kView, common, J.transpose() * WJ, J.transpose() * We);
     }
     for (Index i = 0; i < n; ++i) cost += add_view_prior(i);
-    cost += add_bias_prior(common + kGyroAt, bias_.gyro - options_.bias.gyro,
-                           options_.gyro_deviation);
+    cost +=
+        add_bias_prior(common + kGyroAt, bias_.gyro - options_.bias.gyro, options_.gyro_deviation);
     cost += add_bias_prior(common + kAccelAt, bias_.accel - options_.bias.accel,
                            options_.accel_deviation);
     if (options_.metric) H_(common + kScaleAt, common + kScaleAt) += 1;
@@ -291,8 +291,9 @@ InertialStart estimate_inertial_start(const std::vector<InertialView>& views,
                                       const Pose& T_cb, const ImuNoise& noise,
                                       const InertialStartOptions& options) {
   if (views.size() < kMinViews || samples.size() + 1 != views.size()) {
-    throw std::invalid_argument("an inertial start needs four views or more and the samples "
-                                "between all of them");
+    throw std::invalid_argument(
+        "an inertial start needs four views or more and the samples "
+        "between all of them");
   }
   Problem problem(views, samples, T_cb, noise, options);
   problem.estimate_gyro_bias();

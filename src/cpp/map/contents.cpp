@@ -32,8 +32,8 @@ bool same(const CameraContents& known, const Frame& frame) {
          a.pinhole.cx == b.pinhole.cx && a.pinhole.cy == b.pinhole.cy &&
          a.distortion == b.distortion && a.bf == b.bf && a.depth_ratio == b.depth_ratio &&
          a.image_size.width == b.image_size.width && a.image_size.height == b.image_size.height &&
-         same_model(a.model.get(), b.model.get()) && a.right_centre == b.right_centre && known.scale_factor == frame.scales->factor() &&
-         known.n_levels == frame.scales->levels();
+         same_model(a.model.get(), b.model.get()) && a.right_centre == b.right_centre &&
+         known.scale_factor == frame.scales->factor() && known.n_levels == frame.scales->levels();
 }
 
 /// The frames' cameras, each once, in the order in which they first appear.

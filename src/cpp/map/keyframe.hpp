@@ -48,7 +48,8 @@ struct KeyFrame {
 
   /// Null where the keypoint says where the point is seen.
   const AlignedSighting* aligned_at(std::size_t index, MapPointId point) const {
-    const bool is_aligned = !aligned.empty() && aligned[index].point == point && aligned[index].ok();
+    const bool is_aligned =
+        !aligned.empty() && aligned[index].point == point && aligned[index].ok();
     return is_aligned ? &aligned[index] : nullptr;
   }
 

@@ -45,8 +45,8 @@ class Projector {
     image.u = uv.x();
     image.v = uv.y();
     image.z = p_c.z();
-    image.right_u = image.u - (camera_.is_flat() ? camera_.bf() * (1.0 / image.z)
-                                                 : camera_.disparity(p_c));
+    image.right_u =
+        image.u - (camera_.is_flat() ? camera_.bf() * (1.0 / image.z) : camera_.disparity(p_c));
     return true;
   }
 

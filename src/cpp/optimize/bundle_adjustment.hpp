@@ -45,7 +45,7 @@ struct BundleProblem {
   struct Inertial {
     std::vector<Motion> motions;
     std::vector<ImuLink> links;
-    Pose T_cb;                                           ///< from the IMU to the camera
+    Pose T_cb;                                          ///< from the IMU to the camera
     Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< of free fall in the world [m/s^2]
   };
   std::vector<Camera> cameras;

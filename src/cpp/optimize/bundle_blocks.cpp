@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Levenberg-Marquardt over blocks of fixed size. See docs/method/adjustment.md#blocks.
-#include <algorithm>
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -265,8 +265,8 @@ class BlockMinimiser final : public BundleMinimiser {
     for (std::size_t j = 0; j < n; ++j) {
       for (std::size_t i = j; i < n; ++i, block += kBlockSize) {
         const Eigen::Map<const Matrix6d> values(block);
-        auto target = H.block<6, 6>(static_cast<Eigen::Index>(6 * i),
-                                    static_cast<Eigen::Index>(6 * j));
+        auto target =
+            H.block<6, 6>(static_cast<Eigen::Index>(6 * i), static_cast<Eigen::Index>(6 * j));
         if (i == j) {
           target.triangularView<Eigen::Lower>() += values;
         } else {

@@ -109,16 +109,14 @@ void GatheredBundle::add_points(const std::vector<const MapPoint*>& added, const
   by_id.resize(static_cast<std::size_t>(last->value - first->value) + 1, {0, nullptr});
   const auto lowest = first->value;
   for (std::uint32_t i = 0; i < keyframes.size(); ++i) {
-    by_id[static_cast<std::size_t>(keyframes[i].value - lowest)] = {
-        i, map.find(keyframes[i])};
+    by_id[static_cast<std::size_t>(keyframes[i].value - lowest)] = {i, map.find(keyframes[i])};
   }
   for (const MapPoint* point : added) {
     const std::uint32_t slot = begin_point(*this, *point);
     for (const orbslam::Observation& observation : point->observations) {
       const auto at = static_cast<std::size_t>(observation.keyframe.value - lowest);
       if (at >= by_id.size() || by_id[at].keyframe == nullptr) continue;  // lower ones wrap around
-      add_observation(*this, by_id[at].camera, slot, *by_id[at].keyframe, observation,
-                      map.noise());
+      add_observation(*this, by_id[at].camera, slot, *by_id[at].keyframe, observation, map.noise());
     }
     weigh_reference(*this, map);
   }

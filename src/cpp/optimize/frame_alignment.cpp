@@ -44,7 +44,8 @@ std::vector<Sighting> sightings_of(const Map& map, const TrackedFrame& frame, st
 float weight_of(double noise, const NoiseFactor& measured, float variance, float corner) {
   if (noise > 0) return std::max(corner, corner / static_cast<float>(noise * noise));
   const double factor = measured.value();
-  return std::max(corner, static_cast<float>(1 / (factor * factor * static_cast<double>(variance))));
+  return std::max(corner,
+                  static_cast<float>(1 / (factor * factor * static_cast<double>(variance))));
 }
 
 }  // namespace

@@ -41,11 +41,11 @@ void FrameSightings::keep(const TrackedFrame& frame) {
       if (!frame.map_points[i].valid() || frame.outlier[i] != 0) continue;
       const Keypoint& keypoint = f.keypoints[i];
       const auto weight = static_cast<float>(f.scales->inverse_sigma2(keypoint.level));
-      Sighting seen{frame.map_points[i], keypoint.x, keypoint.y,      f.right_u[i],
-                    weight,              1,          f.has_depth(i)};
+      Sighting seen{frame.map_points[i], keypoint.x, keypoint.y, f.right_u[i], weight, 1,
+                    f.has_depth(i)};
       if (const AlignedPixel* a = frame.aligned_at(i)) {
-        seen = {seen.point,        a->u,            a->v,          a->right_u,
-                a->inverse_sigma2, a->right_factor, seen.has_depth};
+        seen = {seen.point,      a->u,          a->v, a->right_u, a->inverse_sigma2,
+                a->right_factor, seen.has_depth};
       }
       sightings.seen.push_back(seen);
     }
@@ -95,8 +95,8 @@ std::optional<Pose> FrameSightings::settled_pose(const Map& map, const Trajector
     for (const Sighting& s : sightings.seen) {
       const MapPoint* point = map.find(map.resolve(s.point));
       if (point == nullptr) continue;
-      observations.push_back({point->position, s.u, s.v, s.right_u, s.inverse_sigma2, s.has_depth,
-                              s.right_factor});
+      observations.push_back(
+          {point->position, s.u, s.v, s.right_u, s.inverse_sigma2, s.has_depth, s.right_factor});
     }
   }
   const auto enough = std::max(static_cast<double>(kFewestSightings),

@@ -30,7 +30,8 @@ class InertialKeyframes {
   /// False where there is none.
   bool find(KeyFrameId keyframe, Eigen::Vector3d& velocity, ImuBias& bias) const;
 
-  /// Newest keyframes with a state of a map, up to `n`, by time. The caller holds a lock of the map.
+  /// Newest keyframes with a state of a map, up to `n`, by time. The caller holds a lock of the
+  /// map.
   std::vector<KeyFrameId> newest(const Map& map, MapIndex which, std::size_t n) const;
   /// Adds motions of the cameras of a bundle that are in `chain`, and links between neighbours.
   /// The caller holds a lock of the map.
@@ -45,7 +46,8 @@ class InertialKeyframes {
     double scale = 1;
   };
   const State* state_of(KeyFrameId keyframe) const;
-  std::shared_ptr<const Preintegration> between(double begin, double end, const ImuBias& bias) const;
+  std::shared_ptr<const Preintegration> between(double begin, double end,
+                                                const ImuBias& bias) const;
 
   Pose T_cb_;
   ImuNoise noise_;

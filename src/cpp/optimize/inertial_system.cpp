@@ -87,8 +87,8 @@ double InertialSystem::cost(const std::vector<Pose>& poses, bool moved) const {
                                        state(poses, second), problem_.inertial.gravity);
     sum += r.error.dot(information_[i] * r.error);
     const Vector6d walk = difference(second.bias, first.bias);
-    sum += walk.dot(link.motion->bias_walk_covariance().diagonal().cwiseInverse().asDiagonal() *
-                    walk);
+    sum +=
+        walk.dot(link.motion->bias_walk_covariance().diagonal().cwiseInverse().asDiagonal() * walk);
   }
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const Vector6d off = difference(motions[i].bias, priors_[i].bias);
@@ -114,11 +114,10 @@ void InertialSystem::linearise(const std::vector<Pose>& poses, Eigen::MatrixXd& 
     };
     Eigen::Matrix<double, 9, kMotion> by_first = Eigen::Matrix<double, 9, kMotion>::Zero();
     by_first << r.by_first.middleCols<3>(3), r.by_bias;
-    const std::vector<Part<9>> parts{
-        {camera_at_[link.first], by_pose(r.by_first, from)},
-        {camera_at_[link.second], by_pose(r.by_second, to)},
-        {motion_at_[link.first], by_first},
-        {motion_at_[link.second], r.by_second.middleCols<3>(3)}};
+    const std::vector<Part<9>> parts{{camera_at_[link.first], by_pose(r.by_first, from)},
+                                     {camera_at_[link.second], by_pose(r.by_second, to)},
+                                     {motion_at_[link.first], by_first},
+                                     {motion_at_[link.second], r.by_second.middleCols<3>(3)}};
     add<9>(parts, information_[i], r.error, H, b);
     const Matrix6d walk =
         link.motion->bias_walk_covariance().diagonal().cwiseInverse().asDiagonal();

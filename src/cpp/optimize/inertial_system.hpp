@@ -44,7 +44,7 @@ class InertialSystem {
 
   const BundleProblem& problem_;
   Pose T_bc_;
-  Matrix6d to_body_;  ///< tangents of the camera to those of the IMU
+  Matrix6d to_body_;                        ///< tangents of the camera to those of the IMU
   std::vector<int> camera_at_, motion_at_;  ///< first unknown; -1: none
   std::vector<int> free_index_;             ///< per camera of the problem; -1: fixed
   std::vector<Matrix9d> information_;       ///< per link

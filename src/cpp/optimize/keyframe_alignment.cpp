@@ -154,17 +154,17 @@ void align_one(const Task& task, Sighting& sighting) {
   const Keypoint& keypoint = frame.keypoints[sighting.slot];
   AlignedSighting& result = sighting.result;
   result.point = point.id;
-  result.reference = patch.keyframe == view.keyframe &&
-                     patch.pixel == raw_pixel(frame, sighting.slot);
+  result.reference =
+      patch.keyframe == view.keyframe && patch.pixel == raw_pixel(frame, sighting.slot);
   if (result.reference) {
     sighting.failure = AlignmentFailure::kNone;
     result.u = keypoint.x;
     result.v = keypoint.y;
-    result.variance = static_cast<float>(kLeastAlignedVariance) *
-                      frame.scales->sigma2(keypoint.level);
+    result.variance =
+        static_cast<float>(kLeastAlignedVariance) * frame.scales->sigma2(keypoint.level);
   } else {
-    const FoundPatch found = find_patch(placed, frame, view.T_cw, view.images->left,
-                                        raw_pixel(frame, sighting.slot));
+    const FoundPatch found =
+        find_patch(placed, frame, view.T_cw, view.images->left, raw_pixel(frame, sighting.slot));
     sighting.failure = found.failure;
     if (!found.ok()) return;
     result.u = found.u;

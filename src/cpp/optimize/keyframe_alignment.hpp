@@ -7,16 +7,16 @@
 namespace orbslam {
 
 struct KeyframeAlignment {
-  int n_patches = 0;        ///< points that got their reference sighting
+  int n_patches = 0;         ///< points that got their reference sighting
   AlignmentCounts counts{};  ///< sightings that were tried, by result; entry 0: aligned
 };
 
 /// Aligns sightings to the patches of their points, in a new keyframe and in those of its
 /// neighbours that still have their images: each sighting once. A point without a patch gets that
-/// of its youngest sighting in these keyframes. With `patches_only` nothing is aligned. `noise`: standard
-/// deviation of an aligned sighting over that of a corner; 0: as patches and adjustments say. Reads and
-/// writes under the locks of the map, aligns without; a sighting that has gone meanwhile is
-/// ignored. A keyframe that is dead gives an empty result. See
+/// of its youngest sighting in these keyframes. With `patches_only` nothing is aligned. `noise`:
+/// standard deviation of an aligned sighting over that of a corner; 0: as patches and adjustments
+/// say. Reads and writes under the locks of the map, aligns without; a sighting that has gone
+/// meanwhile is ignored. A keyframe that is dead gives an empty result. See
 /// docs/method/alignment.md#new-keyframes.
 KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise = 0,
                                   bool patches_only = false, int n_threads = 1);

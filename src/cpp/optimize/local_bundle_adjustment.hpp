@@ -4,8 +4,8 @@
 #include <atomic>
 
 #include "map/map.hpp"
-#include "optimize/inertial_keyframes.hpp"
 #include "optimize/bundle_adjustment.hpp"
+#include "optimize/inertial_keyframes.hpp"
 
 namespace orbslam {
 

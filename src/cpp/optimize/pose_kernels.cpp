@@ -76,8 +76,7 @@ void Group::clear() {
 }
 
 void Group::push_back(const Eigen::Vector3d& position, double u_px, double v_px, double right_u_px,
-                      double inverse_variance, double right_factor_of_it,
-                      std::size_t caller_slot) {
+                      double inverse_variance, double right_factor_of_it, std::size_t caller_slot) {
   x.push_back(position.x());
   y.push_back(position.y());
   z.push_back(position.z());

@@ -93,8 +93,7 @@ double accumulate_prior(const PosePrior& prior, const Pose& T_cw, NormalEquation
 double evaluate(const Workspace& w, const Camera& camera, const Pose& T_cw, bool robust,
                 NormalEquations* equations) {
   if (equations != nullptr) *equations = NormalEquations();
-  const double of_prior =
-      w.prior != nullptr ? accumulate_prior(*w.prior, T_cw, equations) : 0.0;
+  const double of_prior = w.prior != nullptr ? accumulate_prior(*w.prior, T_cw, equations) : 0.0;
   return of_prior + accumulate_mono(w.mono, camera, T_cw, robust ? kHuberMono : 0.0, equations) +
          accumulate_stereo(w.stereo, camera, T_cw, robust ? kHuberStereo : 0.0, equations);
 }
@@ -323,9 +322,8 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
   estimate.outlier.resize(observations.size());
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const PoseObservation& o = observations[i];
-    const bool usable =
-        w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth,
-              o.right_factor, i);
+    const bool usable = w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2,
+                              o.has_depth, o.right_factor, i);
     estimate.outlier[i] = usable ? 0 : 1;
   }
   run_rounds(w, camera, T_cw_initial, estimate, estimate.outlier.data());

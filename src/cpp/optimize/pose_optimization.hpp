@@ -20,8 +20,8 @@ struct PoseObservation {
 
 /// Gaussian of a pose: `T_cw = exp(e) mean` with `e` (rotation, translation) of mean zero.
 struct PosePrior {
-  Pose mean;                                 ///< T_cw
-  Matrix6d information = Matrix6d::Zero();   ///< inverse of the covariance of `e`
+  Pose mean;                                ///< T_cw
+  Matrix6d information = Matrix6d::Zero();  ///< inverse of the covariance of `e`
 };
 
 struct PoseEstimate {
@@ -49,9 +49,10 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
                            const PosePrior* prior = nullptr);
 
 /// The same for a frame's associations, at their aligned positions where there are some
-/// (TrackedFrame::aligned). An aligned one is an outlier only if its keypoint is one as well. It: starts from its pose, and writes its pose and outlier flags
-/// (of all slots; those without a point get 0). `outlier` of the result stays empty, so that calls
-/// after a thread's first do not allocate. Throws StateError when the frame has no pose.
+/// (TrackedFrame::aligned). An aligned one is an outlier only if its keypoint is one as well. It:
+/// starts from its pose, and writes its pose and outlier flags (of all slots; those without a point
+/// get 0). `outlier` of the result stays empty, so that calls after a thread's first do not
+/// allocate. Throws StateError when the frame has no pose.
 PoseEstimate optimize_pose(TrackedFrame& frame, const PosePrior* prior = nullptr);
 
 /// Covariance (rotation, translation; left perturbation) of the pose that a frame has, for

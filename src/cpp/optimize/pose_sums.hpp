@@ -27,9 +27,9 @@ struct Task {
   const double* right_u;  ///< pixels; read in the group with depth alone
   const double* weight;
   const double* right_factor;  ///< weight of the right column over that of u and v
-  bool has_sights;         ///< false: the camera is a pinhole, and u and v say the same
-  const double* sight[9];  ///< by rows
-  double rotation[9];      ///< R_cw by rows
+  bool has_sights;             ///< false: the camera is a pinhole, and u and v say the same
+  const double* sight[9];      ///< by rows
+  double rotation[9];          ///< R_cw by rows
   double translation[3];
   double fx, fy, cx, cy;
   double base;   ///< baseline [m]

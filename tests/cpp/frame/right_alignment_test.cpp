@@ -50,7 +50,8 @@ std::shared_ptr<Frame> shifted_frame(double off, double rows = 0, bool with_righ
   };
   FrameImages::Pyramids images;
   images.left = resized_pyramid(picture(texture, same, {}, size), *context.scales);
-  if (with_right) images.right = resized_pyramid(picture(texture, moved, {}, size), *context.scales);
+  if (with_right)
+    images.right = resized_pyramid(picture(texture, moved, {}, size), *context.scales);
   frame->images = std::make_shared<FrameImages>(std::move(images));
   return frame;
 }

@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-
 #include <cmath>
 #include <random>
 
@@ -49,9 +48,10 @@ std::shared_ptr<const Camera> left_camera(const Pose& T_rl = extrinsics()) {
 /// Smooth grey values in space that look different everywhere.
 double texture(const Eigen::Vector3d& p) {
   double sum = 0;
-  const double waves[][4] = {{9, 4, -6, 0.3}, {-5, 11, 3, 1.1}, {7, -8, 10, 2.2},
+  const double waves[][4] = {{9, 4, -6, 0.3}, {-5, 11, 3, 1.1},   {7, -8, 10, 2.2},
                              {13, 6, 5, 0.7}, {-10, -3, 12, 1.9}, {4, 14, -9, 2.8}};
-  for (const auto& w : waves) sum += std::sin(1.7 * (w[0] * p.x() + w[1] * p.y() + w[2] * p.z()) + w[3]);
+  for (const auto& w : waves)
+    sum += std::sin(1.7 * (w[0] * p.x() + w[1] * p.y() + w[2] * p.z()) + w[3]);
   return 127 + 20 * sum;
 }
 
@@ -67,8 +67,7 @@ cv::Mat image_of(const CameraModel& model, const Pose& T_cl) {
       const Eigen::Vector3d d = R_lc * ray;
       const double b = d.dot(centre);
       const double t = -b + std::sqrt(b * b - centre.squaredNorm() + kDistance * kDistance);
-      image.at<std::uint8_t>(v, u) =
-          cv::saturate_cast<std::uint8_t>(texture(centre + t * d));
+      image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(texture(centre + t * d));
     }
   }
   return image;
@@ -142,8 +141,8 @@ TEST(WidePair, FindsNothingWhenTheImagesAreSwapped) {
   const WidePair pair(left_camera(), lens(203), extrinsics());
   const SpherePair images = sphere_pair();
   const StereoMatches found = pair.match(images.right, images.left, wide_scales());
-  const auto n_found = std::count_if(found.depth.begin(), found.depth.end(),
-                                     [](float depth) { return depth > 0; });
+  const auto n_found =
+      std::count_if(found.depth.begin(), found.depth.end(), [](float depth) { return depth > 0; });
   EXPECT_LT(static_cast<double>(n_found), 0.1 * static_cast<double>(found.depth.size()));
 }
 

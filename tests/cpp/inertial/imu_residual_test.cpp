@@ -11,7 +11,6 @@ namespace {
 using testing::AnalyticMotion;
 using testing::kFall;
 
-
 ImuState moved(const ImuState& state, const Vector9d& error) {
   const Eigen::Vector3d turn = error.head<3>();
   return {Pose((state.T_wb.rotation() * so3_exp(turn)).normalized(),

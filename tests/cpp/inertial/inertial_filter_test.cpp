@@ -15,7 +15,6 @@ using testing::AnalyticMotion;
 using testing::normal;
 using F = InertialFilter;
 
-
 Pose camera_at(double t) {
   return testing::kT_cb * Pose(AnalyticMotion::rotation(t), AnalyticMotion::position(t)).inverse();
 }
@@ -33,8 +32,9 @@ Eigen::Matrix<double, F::kSize, 1> error_of(const F& filter, double t) {
   const ImuState& state = filter.state();
   error << so3_log((state.T_wb.rotation().conjugate() * AnalyticMotion::rotation(t)).normalized()),
       AnalyticMotion::velocity(t) - state.velocity,
-      AnalyticMotion::position(t) - state.T_wb.translation(), testing::kBias.gyro - filter.bias().gyro,
-      testing::kBias.accel - filter.bias().accel, -filter.tilt(), -filter.log_scale();
+      AnalyticMotion::position(t) - state.T_wb.translation(),
+      testing::kBias.gyro - filter.bias().gyro, testing::kBias.accel - filter.bias().accel,
+      -filter.tilt(), -filter.log_scale();
   return error;
 }
 
@@ -47,7 +47,8 @@ F drawn_filter(std::mt19937_64& random, double t) {
   const ImuState state{Pose((AnalyticMotion::rotation(t) * so3_exp(turn)).normalized(),
                             AnalyticMotion::position(t) + e.segment<3>(F::kPosition)),
                        AnalyticMotion::velocity(t) + e.segment<3>(F::kVelocity)};
-  const ImuBias bias{testing::kBias.gyro + e.segment<3>(F::kGyro), testing::kBias.accel + e.segment<3>(F::kAccel)};
+  const ImuBias bias{testing::kBias.gyro + e.segment<3>(F::kGyro),
+                     testing::kBias.accel + e.segment<3>(F::kAccel)};
   F::Covariance known = P;
   known.block<2, 2>(F::kTilt, F::kTilt) *= 1;
   return {testing::kT_cb, testing::kNoise, state, bias, known};
@@ -74,8 +75,8 @@ TEST(InertialFilter, ErrorsAreAsLargeAsTheCovarianceSays) {
     F filter = drawn_filter(random, 0);
     for (int image = 0; image < 100; ++image) {
       const double t = 0.05 * image;
-      filter.predict(testing::measured(AnalyticMotion::samples(t, t + 0.05, 20), testing::kNoise, testing::kBias,
-                                       random));
+      filter.predict(testing::measured(AnalyticMotion::samples(t, t + 0.05, 20), testing::kNoise,
+                                       testing::kBias, random));
       const auto e = error_of(filter, t + 0.05).head<15>().eval();
       const Eigen::Matrix<double, 15, 15> P = filter.covariance().topLeftCorner<15, 15>();
       if (image == 0) first += e.dot(P.ldlt().solve(e));
@@ -92,7 +93,8 @@ TEST(InertialFilter, FindsBiasesTiltAndScale) {
   const Eigen::Quaterniond turn = so3_exp({0.02, -0.03, 0});
   const double factor = 1.05;
   std::mt19937_64 random(2);
-  const Pose T_wb0(turn * AnalyticMotion::rotation(0), factor * (turn * AnalyticMotion::position(0)));
+  const Pose T_wb0(turn * AnalyticMotion::rotation(0),
+                   factor * (turn * AnalyticMotion::position(0)));
   F::Covariance P = first_covariance();
   P(F::kTilt, F::kTilt) = P(F::kTilt + 1, F::kTilt + 1) = 0.05 * 0.05;
   P(F::kScale, F::kScale) = 0.1 * 0.1;
@@ -100,8 +102,8 @@ TEST(InertialFilter, FindsBiasesTiltAndScale) {
   const Matrix6d R = image_deviation().cwiseAbs2().asDiagonal();
   for (int image = 0; image < 400; ++image) {
     const double t = 0.05 * (image + 1);
-    filter.predict(testing::measured(AnalyticMotion::samples(t - 0.05, t, 20), testing::kNoise, testing::kBias,
-                                     random));
+    filter.predict(testing::measured(AnalyticMotion::samples(t - 0.05, t, 20), testing::kNoise,
+                                     testing::kBias, random));
     // The camera is where it is; the map around it is turned and larger.
     const Pose T_wc = camera_at(t).inverse();
     const Pose seen(turn * T_wc.rotation(), factor * (turn * T_wc.translation()));
@@ -128,8 +130,8 @@ TEST(InertialFilter, LeadsThroughThreeSecondsWithoutImages) {
     F filter = drawn_filter(random, 0);
     for (int image = 0; image < 260; ++image) {
       const double t = 0.05 * image;
-      filter.predict(testing::measured(AnalyticMotion::samples(t, t + 0.05, 20), testing::kNoise, testing::kBias,
-                                       random));
+      filter.predict(testing::measured(AnalyticMotion::samples(t, t + 0.05, 20), testing::kNoise,
+                                       testing::kBias, random));
       if (image < 200) {
         filter.update(Pose::exp(drawn(random, image_deviation())) * camera_at(t + 0.05), R);
       }

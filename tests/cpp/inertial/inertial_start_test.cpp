@@ -33,8 +33,8 @@ Data data(int n_views, double step, double scale, std::mt19937_64& random) {
     all.views.push_back({t, Pose(kTurn * T_wc.rotation() * so3_exp(turn),
                                  kTurn * T_wc.translation() / scale + 2e-3 * off)});
     if (i + 1 == n_views) break;
-    all.samples.push_back(testing::measured(AnalyticMotion::samples(t, t + step, 40), testing::kNoise,
-                                            testing::kBias, random));
+    all.samples.push_back(testing::measured(AnalyticMotion::samples(t, t + step, 40),
+                                            testing::kNoise, testing::kBias, random));
   }
   return all;
 }
@@ -88,7 +88,8 @@ TEST(InertialStart, FindsGravityAndGyroBiasAtRest) {
   std::mt19937_64 random(3);
   Data all = data(11, 0.2, 1, random);
   const Pose T_wc = all.views.front().T_wc;
-  const Eigen::Vector3d force = (T_wc * testing::kT_cb).rotation().conjugate() * (kTurn * -testing::kFall);
+  const Eigen::Vector3d force =
+      (T_wc * testing::kT_cb).rotation().conjugate() * (kTurn * -testing::kFall);
   for (InertialView& view : all.views) view.T_wc = T_wc;
   for (auto& between : all.samples) {
     for (ImuSample& sample : between) {
@@ -100,7 +101,8 @@ TEST(InertialStart, FindsGravityAndGyroBiasAtRest) {
   ASSERT_TRUE(start.solved);
   EXPECT_LT((start.bias.gyro - testing::kBias.gyro).norm(), 1e-3);
   EXPECT_LT(angle(start.gravity, kTurn * testing::kFall), 1e-3);
-  // Tilt and bias of the accelerometer cannot be told apart: the prior of the bias is what is known.
+  // Tilt and bias of the accelerometer cannot be told apart: the prior of the bias is what is
+  // known.
   EXPECT_NEAR(start.gravity_deviation, 0.2 / 9.81, 2e-3);
   // With one camera the scale is not determined.
   const InertialStart of_one = start_of(all, false);

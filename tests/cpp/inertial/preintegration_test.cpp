@@ -9,8 +9,8 @@
 #include <random>
 #include <stdexcept>
 
-#include "support/analytic_motion.hpp"
 #include "inertial/so3.hpp"
+#include "support/analytic_motion.hpp"
 
 namespace orbslam {
 namespace {

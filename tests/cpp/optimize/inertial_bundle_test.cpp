@@ -45,8 +45,8 @@ BundleProblem one_camera(int n_cameras, std::uint64_t seed) {
     motion.bias_information << Eigen::Vector3d::Constant(1e4), Eigen::Vector3d::Constant(1e2);
     problem.inertial.motions.push_back(motion);
     if (i == 0) continue;
-    const auto samples = testing::measured(AnalyticMotion::samples(t - kStep, t, 50), kNoise,
-                                           kBias, random);
+    const auto samples =
+        testing::measured(AnalyticMotion::samples(t - kStep, t, 50), kNoise, kBias, random);
     problem.inertial.links.push_back(
         {motion.camera - 1, motion.camera,
          std::make_shared<Preintegration>(samples, kNoise, motion.bias)});
@@ -56,9 +56,9 @@ BundleProblem one_camera(int n_cameras, std::uint64_t seed) {
   for (std::uint32_t k = 0; k < 300; ++k) {
     // In view of one of the cameras, and of others by chance.
     const Pose T_wc = camera_at(kStep * (k % static_cast<std::uint32_t>(n_cameras))).inverse();
-    const Eigen::Vector3d point = T_wc * model->unproject(uniform(random, 50, 590),
-                                                          uniform(random, 50, 430),
-                                                          uniform(random, 2, 8));
+    const Eigen::Vector3d point =
+        T_wc *
+        model->unproject(uniform(random, 50, 590), uniform(random, 50, 430), uniform(random, 2, 8));
     problem.points.push_back(grown(point));
     for (int i = 0; i < n_cameras; ++i) {
       const Eigen::Vector3d p = camera_at(kStep * i) * point;

@@ -27,7 +27,8 @@ double scatter(const Wall& wall, bool aligned) {
       const AlignedSighting* a = keyframe.aligned_at(o.index, point.id);
       if (aligned && a == nullptr) continue;
       const Keypoint& k = keyframe.frame->keypoints[o.index];
-      const Eigen::Vector2d seen = aligned ? Eigen::Vector2d(a->u, a->v) : Eigen::Vector2d(k.x, k.y);
+      const Eigen::Vector2d seen =
+          aligned ? Eigen::Vector2d(a->u, a->v) : Eigen::Vector2d(k.x, k.y);
       Eigen::Vector2d truth;
       const Pose& T_cw = wall.truth[static_cast<std::size_t>(o.keyframe.value)];
       Eigen::Vector3d at = point.position;
@@ -105,9 +106,9 @@ TEST(AlignKeyframes, LocalAdjustmentIsMoreExactWithIt) {
   Wall corners, aligned;
   align_keyframes(aligned.map, kNewest);
   for (Wall* wall : {&corners, &aligned}) {
-    ASSERT_TRUE(local_bundle_adjustment(wall->map, kNewest, nullptr, false, 1,
-                                        BundleSolver::kBlocks, true)
-                    .committed);
+    ASSERT_TRUE(
+        local_bundle_adjustment(wall->map, kNewest, nullptr, false, 1, BundleSolver::kBlocks, true)
+            .committed);
   }
   EXPECT_LT(aligned.largest_error(), 0.7 * corners.largest_error());
   // Corners in the right images limit it; the noise of the left ones was measured.

@@ -70,7 +70,8 @@ struct Seen {
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double e_u = u[i] - (500 * x[i] / z[i] + 320), e_v = v[i] - (510 * y[i] / z[i] + 240);
       const double e_r = right_u[i] - (500 * x[i] / z[i] + 320 - 40 / z[i]);
-      const double q = weight[i] * (e_u * e_u + e_v * e_v + (stereo ? right_factor[i] * e_r * e_r : 0));
+      const double q =
+          weight[i] * (e_u * e_u + e_v * e_v + (stereo ? right_factor[i] * e_r * e_r : 0));
       const bool inside = huber <= 0 || q <= huber * huber;
       sum += inside ? q : 2 * huber * std::sqrt(q) - huber * huber;
     }

@@ -56,8 +56,8 @@ inline double normal(std::mt19937_64& random) {
 /// Samples with white noise and a constant bias.
 inline std::vector<ImuSample> measured(std::vector<ImuSample> samples, const ImuNoise& noise,
                                        const ImuBias& bias, std::mt19937_64& random) {
-  const double root = std::sqrt(static_cast<double>(samples.size() - 1) /
-                                (samples.back().t - samples.front().t));
+  const double root =
+      std::sqrt(static_cast<double>(samples.size() - 1) / (samples.back().t - samples.front().t));
   for (ImuSample& sample : samples) {
     for (int i = 0; i < 3; ++i) {
       sample.gyro(i) += bias.gyro(i) + noise.gyro * root * normal(random);
