@@ -106,9 +106,9 @@ TEST(AlignKeyframes, LocalAdjustmentIsMoreExactWithIt) {
   Wall corners, aligned;
   align_keyframes(aligned.map, kNewest);
   for (Wall* wall : {&corners, &aligned}) {
-    ASSERT_TRUE(
-        local_bundle_adjustment(wall->map, kNewest, nullptr, false, 1, BundleSolver::kBlocks, true)
-            .committed);
+    ASSERT_TRUE(local_bundle_adjustment(wall->map, kNewest, nullptr, false, 1,
+                                        BundleSolver::kBlocks, nullptr, true)
+                    .committed);
   }
   EXPECT_LT(aligned.largest_error(), 0.7 * corners.largest_error());
   // Corners in the right images limit it; the noise of the left ones was measured.
