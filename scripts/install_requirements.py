@@ -20,6 +20,8 @@ except ModuleNotFoundError:  # Python 3.10
 
 #: Extras that the demo has: its last line names --viewer.
 DEMO_EXTRAS = ("viewer",)
+#: Extras that developers install themselves: a wheel of 96 MB, whose tests are skipped without it.
+LARGE_EXTRAS = ("oak",)
 
 
 def requirements(purpose: str, pyproject: Path = PROJECT / "pyproject.toml") -> list[str]:
@@ -31,7 +33,8 @@ def requirements(purpose: str, pyproject: Path = PROJECT / "pyproject.toml") -> 
         return list(build)
     if purpose == "demo":
         return [*project["dependencies"], *(p for extra in DEMO_EXTRAS for p in extras[extra])]
-    return [*build, *project["dependencies"], *(p for extra in extras.values() for p in extra)]
+    usual = [packages for name, packages in extras.items() if name not in LARGE_EXTRAS]
+    return [*build, *project["dependencies"], *(p for packages in usual for p in packages)]
 
 
 def pip_step(purpose: str) -> Step:

@@ -11,12 +11,18 @@ from datetime import timedelta
 from functools import cached_property
 from typing import Any
 
-import depthai as dai
 import numpy as np
 
 from orbslam2py.errors import DatasetError
 from orbslam2py.live.device import FoundDevice, Request, Sink, Stream
-from orbslam2py.live.oak_calibration import COLOUR, LEFT, RIGHT, imu_settings_of, settings_of
+from orbslam2py.live.oak_calibration import (
+    COLOUR,
+    LEFT,
+    RIGHT,
+    dai,
+    imu_settings_of,
+    settings_of,
+)
 from orbslam2py.live.usb import find_usb
 from orbslam2py.settings import ImuSettings, Sensor, Settings
 

@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import depthai as dai
 import numpy as np
+
+# Its warnings go to the standard output, where those of programs are that read ours.
+os.environ.setdefault("DEPTHAI_LEVEL", "error")
+import depthai as dai
 
 from orbslam2py.datasets.bags.calibration import (
     CameraInfo,
@@ -17,6 +21,8 @@ from orbslam2py.datasets.bags.calibration import (
 )
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import ImuSettings, Sensor, Settings, imu_noise
+
+__all__ = ["COLOUR", "DEPTH_PER_METRE", "LEFT", "RIGHT", "dai", "imu_settings_of", "settings_of"]
 
 #: Where the cameras of an OAK-D are.
 COLOUR, LEFT, RIGHT = (

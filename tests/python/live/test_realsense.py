@@ -26,6 +26,13 @@ pytestmark = pytest.mark.watchdog(100)
 SIZE, N = (320, 240), 24
 
 
+@pytest.fixture(autouse=True)
+def _busy_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the computer that runs the test be slow."""
+    monkeypatch.setattr("orbslam2py.live.inlet._IMU_WAIT", 5.0)
+    monkeypatch.setattr("orbslam2py.live.rate._WINDOW", 1e9)
+
+
 def made_of(sequence: SyntheticSequence, fps: int = 30) -> SoftwareRealSense:
     camera = sequence.camera
     return SoftwareRealSense(

@@ -129,7 +129,10 @@ def test_the_demo_installs_what_it_imports_and_the_viewer(scripts: ModuleType) -
     assert demo == {*pyproject["project"]["dependencies"], *extras["viewer"]}
     developer = set(scripts.install_requirements.requirements("developer"))
     assert developer > demo | set(scripts.install_requirements.requirements("build"))
-    assert developer > {package for extra in extras.values() for package in extra}
+    large = set(scripts.install_requirements.LARGE_EXTRAS)
+    usual = [packages for name, packages in extras.items() if name not in large]
+    assert developer > {package for packages in usual for package in packages}
+    assert large == {"oak"} and not developer & set(extras["oak"])
 
 
 # ---- packages of the system ----------------------------------------------------------------------
