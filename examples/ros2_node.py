@@ -17,13 +17,8 @@ import threading
 from pathlib import Path
 
 from orbslam2py import System
-from orbslam2py.live import Request
-from orbslam2py.live.stream import LiveStream
-from orbslam2py.ros.base_frame import choose_base
-from orbslam2py.ros.device import TopicsDevice
-from orbslam2py.ros.output import RosOutput
-from orbslam2py.ros.stamps import StampedSource
-from orbslam2py.ros.transport import LiveTopic
+from orbslam2py.live import LiveStream, Request
+from orbslam2py.ros import LiveTopic, RosOutput, StampedSource, TopicsDevice, choose_base
 from orbslam2py.settings import Sensor
 
 try:
