@@ -20,14 +20,14 @@ from orbslam2py.calibration.boards import Target
 from orbslam2py.calibration.bundle import AdjustedScene, Sighting, adjust
 from orbslam2py.calibration.camera_model import settings_of_model
 from orbslam2py.calibration.chessboard import BoardView, BoardViews, choose_views
-from orbslam2py.calibration.families import OPENCV_FAMILIES, family_of
+from orbslam2py.calibration.families import OPENCV_FAMILIES, padded, wanted_family
 from orbslam2py.calibration.selection import (
     FamilyScore,
     best_of,
     compare_families,
     solve_family,
 )
-from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.errors import DatasetError
 from orbslam2py.settings import OrbSettings, Sensor, Settings, settings_for_camera
 from orbslam2py.settings.camera_model import CameraModel
 
@@ -46,8 +46,6 @@ _GOOD_SIGMA = 0.005
 _OUTLYING = 3.0
 _WORST_FINE = 0.5
 _GRID = (8, 6)
-#: Coefficients of OpenCV's models without a denominator: k1, k2, p1, p2, k3.
-_RADIAL_TANGENTIAL = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,14 +345,6 @@ def calibrate(
     )
 
 
-def wanted_family(model: str | None, *, k3: bool = False) -> str | None:
-    """Return the family of lenses that was asked for, or None for the best one."""
-    family = None if model is None else family_of(model)
-    if k3 and family not in (None, "radtan5"):
-        raise SettingsError(f"k3 goes with the model radtan5, not with {family}; leave k3 out")
-    return "radtan5" if k3 else family
-
-
 def enough_views(found: BoardViews, max_views: int) -> list[BoardView]:
     """Choose views that differ most.
 
@@ -401,10 +391,3 @@ def without_bad_views(
     poses = tuple(T for T, good in zip(scene.T_0b, fine, strict=True) if good)
     begin = type(scene)(scene.cameras, scene.T_c0, poses)
     return kept, left_out, adjust(begin, sightings_of(kept, board))
-
-
-def padded(camera: CameraModel, values: FloatArray) -> FloatArray:
-    """Fill up what models of the radial-tangential lens lack, with zeros."""
-    if camera.name not in ("pinhole", "radtan4", "radtan5"):
-        return values
-    return np.concatenate([values, np.zeros(4 + _RADIAL_TANGENTIAL - len(values))])

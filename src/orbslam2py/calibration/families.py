@@ -37,6 +37,8 @@ _STARTS: dict[str, tuple[tuple[tuple[float, ...], float], ...]] = {
     "mei": (((1.0, 0.0, 0.0, 0.0, 0.0), 2.0), ((0.3, 0.0, 0.0, 0.0, 0.0), 1.3)),
     "fov": (((0.9,), 0.9 / (2 * np.tan(0.45))), ((0.3,), 0.3 / (2 * np.tan(0.15)))),
 }
+#: Coefficients of OpenCV's models without a denominator: k1, k2, p1, p2, k3.
+_RADIAL_TANGENTIAL = 5
 _ITERATIONS = 25
 #: Points farther from the axis than this are left to the wide lenses at first.
 _STEEP = np.radians(80.0)
@@ -70,6 +72,21 @@ def family_of(name: str) -> str:
             if name.lower() in (own, *(alias.lower() for alias in aliases)):
                 return own
     raise SettingsError(f"the lens model is {shown(name)}; give one of {', '.join(FAMILIES)}")
+
+
+def wanted_family(model: str | None, *, k3: bool = False) -> str | None:
+    """Return the family of lenses that was asked for, or None for the best one."""
+    family = None if model is None else family_of(model)
+    if k3 and family not in (None, "radtan5"):
+        raise SettingsError(f"k3 goes with the model radtan5, not with {family}; leave k3 out")
+    return "radtan5" if k3 else family
+
+
+def padded(camera: CameraModel, values: FloatArray) -> FloatArray:
+    """Fill up what models of the radial-tangential lens lack, with zeros."""
+    if camera.name not in ("pinhole", "radtan4", "radtan5"):
+        return values
+    return np.concatenate([values, np.zeros(4 + _RADIAL_TANGENTIAL - len(values))])
 
 
 def fit_lens(

@@ -16,12 +16,11 @@ from orbslam2py.calibration.calibration import (
     CalibratedView,
     Calibration,
     enough_views,
-    padded,
     sightings_of,
-    wanted_family,
     without_bad_views,
 )
 from orbslam2py.calibration.chessboard import BoardView, BoardViews, choose_views
+from orbslam2py.calibration.families import padded, wanted_family
 from orbslam2py.calibration.first_guess import board_pose
 from orbslam2py.calibration.selection import (
     FamilyScore,

@@ -24,7 +24,7 @@ from orbslam2py.calibration import (
     read_camera_file,
 )
 from orbslam2py.calibration import calibrate as calibrate_views
-from orbslam2py.calibration.calibration import wanted_family
+from orbslam2py.calibration.families import wanted_family
 from orbslam2py.calibration.plot import draw_residuals
 from orbslam2py.calibration.rig_files import check_camchain
 from orbslam2py.cli.calibration_results import (
