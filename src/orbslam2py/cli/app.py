@@ -104,7 +104,7 @@ SUBCOMMANDS = {
     "benchmark": Subcommand(
         "batches.benchmark",
         "benchmark",
-        "Run all sequences of TUM RGB-D, KITTI, EuRoC or TUM-VI, beside published figures.",
+        "Run a data set (TUM RGB-D, KITTI, EuRoC, TUM-VI) beside figures of ORB-SLAM2 and 3.",
     ),
     "demo": Subcommand(
         "demo", "demo", "Track a camera once around a synthetic corridor: needs no data."

@@ -70,7 +70,7 @@ def benchmark(
     report_pages: ReportPagesFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Run all sequences of TUM RGB-D, KITTI, EuRoC or TUM-VI, beside figures of ORB-SLAM2 and 3."""
+    """Run a data set (TUM RGB-D, KITTI, EuRoC, TUM-VI) beside figures of ORB-SLAM2 and 3."""
     console, errors = Console(quiet=quiet), Console(stderr=True)
     options: dict[str, Any] = {"deterministic": True} if deterministic else {}
     if max_frames is not None:

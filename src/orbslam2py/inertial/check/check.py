@@ -9,7 +9,7 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.inertial.check import streams
-from orbslam2py.inertial.check.gravity import GravityFit, fit_gravity
+from orbslam2py.inertial.check.accelerometer import check_gravity, longest_piece
 from orbslam2py.inertial.check.rates import (
     CameraRates,
     MeanGyro,
@@ -40,8 +40,6 @@ _SLOW, _LONG = 1.5e-3, 0.2
 _SMALL_SCALE = 0.1
 #: Usual length of the specific force [m/s^2], beyond which its unit is wrong.
 _ODD_FORCE = (4.0, 30.0)
-#: Difference of an accelerometer's misfits [m] that may be one of the path.
-_SMALL_MISFIT = 5e-3
 #: Norm of the difference of two rotations that are 16 degrees apart.
 _SAME_AXES = 0.4
 _READINGS = ("gyro", "accelerometer")
@@ -103,7 +101,7 @@ def check_imu(
         _check_scale(report, rates)
         T_ci = _check_axes(report, rates, settings)
     if T_ci is not None:
-        _check_gravity(report, t, accel, _longest(paths), T_ci, offset, settings)
+        check_gravity(report, t, accel, longest_piece(paths), T_ci, offset, settings)
     return report
 
 
@@ -342,76 +340,3 @@ def _worse(rates: RateFit, M: FloatArray, best: FloatArray) -> bool:
 def _matrix_text(R: FloatArray) -> str:
     rows = ["[" + ", ".join(f"{value:.4f}" for value in row) + "]" for row in R]
     return "[" + ", ".join(rows) + "]"
-
-
-# ---- the accelerometer ---------------------------------------------------------------------------
-
-
-def _longest(paths: Sequence[Trajectory]) -> Trajectory:
-    """The longest piece of a path without a gap."""
-    best: Trajectory | None = None
-    for path in paths:
-        good = np.flatnonzero(~path.lost)
-        cuts = np.flatnonzero((np.diff(good) > 1) | (np.diff(path.timestamps[good]) > 0.3)) + 1
-        for piece in np.split(good, cuts):
-            if best is None or len(piece) > len(best):
-                best = Trajectory(path.timestamps[piece], path.T_wc[piece])
-    assert best is not None
-    return best
-
-
-def _check_gravity(
-    report: ImuReport,
-    t: FloatArray,
-    accel: FloatArray,
-    path: Trajectory,
-    T_ci: FloatArray,
-    offset: float,
-    settings: ImuSettings | None,
-) -> None:
-    if any(fault.kind == "dead" and "accelerometer" in fault.text for fault in report.faults):
-        return
-    fit = fit_gravity(t, accel, path, T_ci, offset)
-    if fit is None:
-        report.open_questions.append("the path is too short to compare the accelerometer with it")
-        return
-    if settings is not None and T_ci is not settings.T_ci:
-        # The gyro asks for another rotation than the settings; whose side does gravity take?
-        other = fit_gravity(t, accel, path, settings.T_ci, offset)
-        if other is not None and other.misfit < 0.5 * fit.misfit:
-            report.notes.append("the accelerometer fits the settings: only the gyro differs")
-            fit = other
-    report.gravity = fit
-    if _axes_differ(fit):
-        if np.array_equal(fit.best_axes, -np.eye(3)):
-            report.blame(
-                "sign",
-                "the accelerometer has the wrong sign: at rest it must point up, as a force does; "
-                "multiply its columns by -1",
-            )
-        else:
-            report.blame(
-                "axes",
-                "the axes of the accelerometer are exchanged or have wrong signs: it fits with "
-                f"{axes_text(fit.best_axes)}; correct these columns of the samples",
-            )
-        return
-    report.notes.append(
-        f"gravity along the path: {fit.magnitude:.2f} m/s^2, {fit.misfit * 1e3:.0f} mm left over; "
-        f"one unit of the path is {fit.scale:.3f} m (+/- {fit.scale_deviation:.3f})"
-    )
-    certain = fit.misfit < 0.05
-    if certain and abs(fit.magnitude / streams.GRAVITY - 1) > _SMALL_SCALE:
-        report.blame(
-            "scale",
-            f"gravity comes out as {fit.magnitude:.2f} m/s^2; correct the scale or the bias of the "
-            "accelerometer",
-        )
-
-
-def _axes_differ(fit: GravityFit) -> bool:
-    return (
-        not np.array_equal(fit.best_axes, np.eye(3))
-        and fit.misfit > 2 * fit.best_misfit
-        and fit.misfit - fit.best_misfit > _SMALL_MISFIT
-    )
