@@ -54,8 +54,8 @@ def checked_extrinsics(T: object, name: str) -> FloatArray:
         )
     if not pose[:3, 3].any():
         raise SettingsError(
-            f"by {name} the two cameras of the pair stand in one place, so they see no depth; "
-            "correct its translation, or use one of them (--sensor mono)"
+            "the two cameras of the pair stand in one place, so they see no depth; look at where "
+            "their calibration puts them, or use one of them (--sensor mono)"
         )
     pose.setflags(write=False)
     return pose

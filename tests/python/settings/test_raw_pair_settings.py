@@ -90,7 +90,7 @@ def in_place(T: FloatArray) -> FloatArray:
         ),
         (scaled, "T_rl is no rigid transform; give 4 x 4 numbers: a rotation and a translation"),
         (upright, "T_rl the cameras stand one above the other, and a pair must stand side by"),
-        (in_place, "T_rl the two cameras of the pair stand in one place, so they see no depth"),
+        (in_place, "the two cameras of the pair stand in one place, so they see no depth; look"),
     ],
 )
 def test_extrinsics_that_cannot_be(degrees: float, change: object, told: str) -> None:
