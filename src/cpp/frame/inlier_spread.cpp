@@ -15,6 +15,16 @@ namespace {
 
 constexpr int kSpreadCells = kSpreadColumns * kSpreadRows;
 constexpr int kPoseParameters = 6;
+/// 95 % of chi-square, three degrees of freedom: an aligned sighting beyond it held no pose.
+constexpr double kAlignedGate = 7.815;
+
+/// Where a keypoint's point is seen, and how well.
+AlignedPixel sighting_of(const TrackedFrame& tracked, std::size_t i) {
+  if (const AlignedPixel* aligned = tracked.aligned_at(i)) return *aligned;
+  const Frame& frame = *tracked.frame;
+  const Keypoint& k = frame.keypoints[i];
+  return {{}, k.x, k.y, frame.right_u[i], frame.scales->inverse_sigma2(k.level), 1};
+}
 
 /// Derivative of a raw pixel (u, v, right u) by the pose's tangent: rotation, then translation.
 Eigen::Matrix<double, 3, kPoseParameters> by_pose(const Eigen::Matrix3d& by_point,
@@ -37,9 +47,8 @@ struct Residuals {
   Residuals() { gradients.fill(Vector6d::Zero()); }
 
   void add(const TrackedFrame& tracked, std::size_t i, std::size_t cell, const Eigen::Vector3d& p,
-           const Sight& sight) {
+           const AlignedPixel& seen, const Sight& sight) {
     const Frame& frame = *tracked.frame;
-    const Keypoint& keypoint = frame.keypoints[i];
     const Eigen::Vector3d q = sight * p;
     const Eigen::Vector2d error = q.head<2>() / q.z();
     Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
@@ -47,16 +56,25 @@ struct Residuals {
     Eigen::Vector3d r(-error.x(), -error.y(), 0);
     const bool has_depth = frame.has_depth(i);
     if (has_depth) {
+<<<<<<< HEAD
       const double bf = frame.camera->bf();
       by_point.row(2) = by_point.row(0) + bf / (q.z() * q.z()) * sight.row(2);
       r.z() = -(error.x() + (keypoint.x - frame.right_u[i]) - bf / q.z());
+=======
+      by_point.row(2) = by_point.row(0);
+      by_point(2, 2) += frame.camera->bf() / (p.z() * p.z());
+      r.z() = -frame.camera->right_error(p, error, seen.u, seen.right_u);
+>>>>>>> subpix
     }
     if (!r.allFinite()) return;
-    const double weight = frame.scales->inverse_sigma2(keypoint.level);
+    const double weight = seen.inverse_sigma2;
+    const Eigen::Vector3d weights(weight, weight, weight * static_cast<double>(seen.right_factor));
+    const double square = r.dot(weights.cwiseProduct(r));
+    if (seen.point.valid() && square > kAlignedGate) return;
     const auto J = by_pose(by_point, p);
-    H.noalias() += weight * J.transpose() * J;
-    gradients[cell].noalias() += weight * J.transpose() * r;
-    squares += weight * r.squaredNorm();
+    H.noalias() += J.transpose() * weights.asDiagonal() * J;
+    gradients[cell].noalias() += J.transpose() * weights.cwiseProduct(r);
+    squares += square;
     n += has_depth ? 3 : 2;
   }
 
@@ -102,12 +120,13 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
                                  std::clamp(column, 0, kSpreadColumns - 1));
     cells.set(cell);
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
-    const Sight sight = camera.sight(keypoint.x, keypoint.y);
+    const AlignedPixel seen = sighting_of(tracked, i);
+    const Sight sight = camera.sight(seen.u, seen.v);
     const double depth = sight.row(2).dot(p);
     if (!(depth > 0)) continue;
     octaves.set(
         static_cast<std::size_t>(std::clamp(std::ilogb(depth) + kOctaves / 2, 0, kOctaves - 1)));
-    residuals.add(tracked, i, cell, p, sight);
+    residuals.add(tracked, i, cell, p, seen, sight);
   }
   const int n_cells = static_cast<int>(cells.count());
   return {n_cells, static_cast<int>(octaves.count()), residuals.covariance(n_cells)};
