@@ -56,15 +56,9 @@ struct Residuals {
     Eigen::Vector3d r(-error.x(), -error.y(), 0);
     const bool has_depth = frame.has_depth(i);
     if (has_depth) {
-<<<<<<< HEAD
       const double bf = frame.camera->bf();
       by_point.row(2) = by_point.row(0) + bf / (q.z() * q.z()) * sight.row(2);
-      r.z() = -(error.x() + (keypoint.x - frame.right_u[i]) - bf / q.z());
-=======
-      by_point.row(2) = by_point.row(0);
-      by_point(2, 2) += frame.camera->bf() / (p.z() * p.z());
-      r.z() = -frame.camera->right_error(p, error, seen.u, seen.right_u);
->>>>>>> subpix
+      r.z() = -(error.x() + (seen.u - seen.right_u) - bf / q.z());
     }
     if (!r.allFinite()) return;
     const double weight = seen.inverse_sigma2;
