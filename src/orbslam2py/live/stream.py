@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import re
 import threading
 import time
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -118,6 +120,7 @@ class LiveStream:
         self._patience = patience
         self._supervisor: threading.Thread | None = None
         self._started_at: float | None = None
+        self._end: weakref.finalize[..., LiveStream] | None = None
         self._stopped = threading.Event()
         self._lost_at: float | None = None
         self._n_restarts = 0
@@ -169,6 +172,8 @@ class LiveStream:
         if self._started_at is None:
             self.device.start(self._inlet)
             self._started_at = time.monotonic()
+            # Whoever forgets to close it: threads of the device must not outlive the interpreter.
+            self._end = weakref.finalize(self, _end, self._inlet, self.device)
 
     def __enter__(self) -> LiveStream:
         """Start the device and watch over it.
@@ -196,6 +201,8 @@ class LiveStream:
         """Stop the device; leaving the context does it."""
         self._stopped.set()
         self._inlet.close()
+        if self._end is not None:
+            self._end.detach()
         stopper = threading.Thread(target=self._stop_device, name="live-stop", daemon=True)
         stopper.start()
         stopper.join(_PATIENCE)
@@ -333,6 +340,13 @@ class LiveStream:
             self.device.stop()
         except Exception as error:  # a lost device may fail in any way; the run must not
             _log.info("%s did not stop cleanly: %s", self.device.name, error)
+
+
+def _end(inlet: Inlet, device: Device) -> None:
+    """Stop a device that nobody stopped, when its source is collected or the program ends."""
+    inlet.close()
+    with contextlib.suppress(Exception):  # a lost device may fail in any way
+        device.stop()
 
 
 def _usual_skew(streams: tuple[Stream, ...], rate: float) -> float:
