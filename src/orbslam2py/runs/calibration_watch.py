@@ -21,7 +21,7 @@ from orbslam2py.calibration.self_calibration import CalibrationGains, calibratio
 from orbslam2py.calibration.tracks import PointTracker, TrackedPair
 from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.datasets.base import Images
-from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of, with_rectified_images
 from orbslam2py.errors import OrbSlamError, SettingsError
 from orbslam2py.settings.comparison import compare_calibrations
 from orbslam2py.settings.depth_check import is_known
@@ -140,6 +140,8 @@ class CalibrationWatch:
         pair = self._settings.rectification
         if pair is None or pair.applied or images.right is None:
             return images
+        if images.image.shape[:2] != (pair.left.height, pair.left.width):
+            return images  # another calibration: the size tells it
         if self._rectifiers is None:
             self._rectifiers = rectifiers_of(self._settings)
         assert self._rectifiers is not None
@@ -280,13 +282,21 @@ def check_calibration(
     >>> print(orb.check_calibration(sequence, orb.Settings.load("tum3", "rgbd")))  # doctest: +SKIP
     """
     images_of: Any = source
-    own = _settings_for(images_of, settings)
+    own = _as_images_come(images_of, _settings_for(images_of, settings))
     watch = CalibrationWatch(
         own, own.sensor, known=settings_beside(images_of), thresholds=thresholds
     )
     for _, images in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
         watch.look(Images(images.image, images.right, images.depth, images.mask))
     return watch.finish()
+
+
+def _as_images_come(source: object, own: Settings) -> Settings:
+    """Settings that do not rectify what a source with settings of its own delivers."""
+    its = getattr(source, "settings", None)
+    if isinstance(its, Settings) and (its.rectification is None or its.rectification.applied):
+        return with_rectified_images(own)
+    return own
 
 
 def _settings_for(source: object, choice: Settings | str | Path | None) -> Settings:
