@@ -63,6 +63,8 @@ class CalibrationWatch:
         The calibration that comes with the images, if one does.
     in_background : bool
         Judge the points in a thread of its own, since the next image does not wait.
+    raw_pairs : bool
+        Pairs come as the cameras take them, and are tracked after rectification by the settings.
     thresholds : FitThresholds, optional
         The limits.
 
@@ -81,8 +83,10 @@ class CalibrationWatch:
         *,
         known: Settings | None = None,
         in_background: bool = False,
+        raw_pairs: bool = False,
         thresholds: FitThresholds | None = None,
     ) -> None:
+        self._raw_pairs = raw_pairs
         self._settings, self._sensor, self._known = settings, sensor, known
         self._limits = thresholds or FitThresholds()
         self._tracker = PointTracker(every=_EVERY, least=_LEAST_POINTS)
@@ -138,7 +142,7 @@ class CalibrationWatch:
     def _as_tracked(self, images: Images) -> Images:
         """Rectify a pair that the system rectifies as well."""
         pair = self._settings.rectification
-        if pair is None or pair.applied or images.right is None:
+        if not self._raw_pairs or pair is None or images.right is None:
             return images
         if images.image.shape[:2] != (pair.left.height, pair.left.width):
             return images  # another calibration: the size tells it
@@ -284,11 +288,21 @@ def check_calibration(
     images_of: Any = source
     own = _as_images_come(images_of, _settings_for(images_of, settings))
     watch = CalibrationWatch(
-        own, own.sensor, known=settings_beside(images_of), thresholds=thresholds
+        own,
+        own.sensor,
+        known=settings_beside(images_of),
+        raw_pairs=come_raw(own),
+        thresholds=thresholds,
     )
     for _, images in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
         watch.look(Images(images.image, images.right, images.depth, images.mask))
     return watch.finish()
+
+
+def come_raw(settings: Settings) -> bool:
+    """Whether the system rectifies the pairs that go with settings."""
+    pair = settings.rectification
+    return pair is not None and not pair.applied
 
 
 def _as_images_come(source: object, own: Settings) -> Settings:

@@ -21,7 +21,7 @@ from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, Layout, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, MapFileError, OrbSlamError
 from orbslam2py.maps.map_arrays import MapArrays
-from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
+from orbslam2py.runs.calibration_watch import CalibrationWatch, come_raw, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.kept_images import KeptImages
@@ -187,6 +187,7 @@ class SequenceRunner:
             self._options.sensor,
             known=settings_beside(self.result.sequence),
             in_background=in_background,
+            raw_pairs=come_raw(self.result.settings),
         )
 
     def _calibration_warnings(self, system: System) -> list[str]:
