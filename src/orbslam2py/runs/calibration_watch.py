@@ -21,7 +21,7 @@ from orbslam2py.calibration.self_calibration import CalibrationGains, calibratio
 from orbslam2py.calibration.tracks import PointTracker, TrackedPair
 from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.datasets.base import Images
-from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of, with_rectified_images
 from orbslam2py.errors import OrbSlamError, SettingsError
 from orbslam2py.settings.comparison import compare_calibrations
 from orbslam2py.settings.depth_check import is_known
@@ -63,6 +63,8 @@ class CalibrationWatch:
         The calibration beside the images, if there is one.
     in_background : bool
         Judge the points in a separate thread, because the next image does not wait.
+    raw_pairs : bool
+        Pairs come as the cameras take them, and are tracked after rectification by the settings.
     thresholds : FitThresholds, optional
         The limits.
 
@@ -81,8 +83,10 @@ class CalibrationWatch:
         *,
         known: Settings | None = None,
         in_background: bool = False,
+        raw_pairs: bool = False,
         thresholds: FitThresholds | None = None,
     ) -> None:
+        self._raw_pairs = raw_pairs
         self._settings, self._sensor, self._known = settings, sensor, known
         self._limits = thresholds or FitThresholds()
         self._tracker = PointTracker(every=_EVERY, least=_LEAST_POINTS)
@@ -138,8 +142,10 @@ class CalibrationWatch:
     def _as_tracked(self, images: Images) -> Images:
         """Rectify a pair that the system rectifies as well."""
         pair = self._settings.rectification
-        if pair is None or pair.applied or images.right is None:
+        if not self._raw_pairs or pair is None or images.right is None:
             return images
+        if images.image.shape[:2] != (pair.left.height, pair.left.width):
+            return images  # another calibration: the size tells it
         if self._rectifiers is None:
             self._rectifiers = rectifiers_of(self._settings)
         assert self._rectifiers is not None
@@ -279,14 +285,32 @@ def check_calibration(
     >>> print(orb.check_calibration(sequence, orb.Settings.load("tum3", "rgbd")))  # doctest: +SKIP
     """
     images_of: Any = source
-    own = _settings_for(images_of, settings)
+    own = _as_images_come(images_of, _settings_for(images_of, settings))
     watch = CalibrationWatch(
-        own, own.sensor, known=settings_beside(images_of), thresholds=thresholds
+        own,
+        own.sensor,
+        known=settings_beside(images_of),
+        raw_pairs=come_raw(own),
+        thresholds=thresholds,
     )
     for one in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
         images = one.images
         watch.look(Images(images.image, images.right, images.depth, images.mask))
     return watch.finish()
+
+
+def come_raw(settings: Settings) -> bool:
+    """Whether the system rectifies the pairs that go with settings."""
+    pair = settings.rectification
+    return pair is not None and not pair.applied
+
+
+def _as_images_come(source: object, own: Settings) -> Settings:
+    """Settings that do not rectify what a source with settings of its own delivers."""
+    its = getattr(source, "settings", None)
+    if isinstance(its, Settings) and (its.rectification is None or its.rectification.applied):
+        return with_rectified_images(own)
+    return own
 
 
 def _settings_for(source: object, choice: Settings | str | Path | None) -> Settings:

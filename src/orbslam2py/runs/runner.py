@@ -22,7 +22,7 @@ from orbslam2py._timing import StageStatistics
 from orbslam2py.datasets.base import Images, Layout, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, MapFileError, OrbSlamError
 from orbslam2py.maps.map_arrays import MapArrays
-from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
+from orbslam2py.runs.calibration_watch import CalibrationWatch, come_raw, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.imu import find_imu, imu_entry
@@ -203,6 +203,7 @@ class SequenceRunner:
             self._options.sensor,
             known=settings_beside(self.result.sequence),
             in_background=in_background,
+            raw_pairs=come_raw(self.result.settings),
         )
 
     def _calibration_warnings(self, system: System) -> list[str]:
