@@ -193,6 +193,9 @@ class Pipeline:
         with timer("track"):
             # Features are found while mapping works: they do not depend on the map.
             frame = core.TrackedFrame(build(self._next_frame_id, timer))
+        if self.localization.on:
+            # Aligned points would pull frames towards the map while odometry still holds them.
+            core.release_images(frame.features)
         if self._waits_for_mapping:
             with timer("wait"):
                 self._wait_for_mapping(frame)
