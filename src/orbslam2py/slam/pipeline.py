@@ -106,7 +106,7 @@ class Pipeline:
             keep_images=alignment.uses_points,
             align_right=alignment.right_image,
         )
-        self._kept_images = KeptImages()
+        self._kept_images = KeptImages(every_frame=config.trajectory.rematch_every_frame)
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         self.tracking = _make_tracking(setup, back_end, options, config)
         self.localization = LocalizationSwitch(
