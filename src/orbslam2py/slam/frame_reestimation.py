@@ -60,6 +60,9 @@ class FrameReestimation:
         keyframe = self._map.living(followed.reference_keyframe)
         if keyframe >= 0 and self._map.frame_of(keyframe) == frame.id:
             return followed
+        if not in_doubt and frame.aligned.any() and not frame.features.has_images:
+            # Corners alone would give it a worse pose.
+            return followed
         refined: RefinedPose | None = None
         for _ in range(_MOST_LOOKS if in_doubt else 1):
             found = followed if refined is None else refined.frame

@@ -109,7 +109,7 @@ class Pipeline:
             keep_images=alignment.uses_points,
             align_right=alignment.right_image,
         )
-        self._kept_images = KeptImages()
+        self._kept_images = KeptImages(every_frame=config.trajectory.rematch_every_frame)
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         #: Uses the IMU in tracking; None without settings of one.
         self.inertial_tracker = _make_inertial(setup, back_end)
@@ -202,6 +202,9 @@ class Pipeline:
         with timer("track"):
             # Features are found while mapping works: they do not depend on the map.
             frame = core.TrackedFrame(build(self._next_frame_id, timer))
+        if self.localization.on:
+            # Aligned points would pull frames towards the map while odometry still holds them.
+            core.release_images(frame.features)
         if self._waits_for_mapping:
             with timer("wait"):
                 self._wait_for_mapping(frame)

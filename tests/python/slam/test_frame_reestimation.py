@@ -34,7 +34,9 @@ class Walk:
             SyntheticOptions(world="corridor", sensor="rgbd", size=(320, 240), frames=N)
         )
         self.frames: list[core.TrackedFrame] = []
-        self.system = System(sequence.settings, "rgbd", deterministic=True)
+        # Matched by corners: aligned frames are left alone once their images are gone.
+        by_corners = {"alignment.rgbd": False}
+        self.system = System(sequence.settings, "rgbd", deterministic=True, config=by_corners)
         for i in range(N):
             images = sequence.load(i)
             self.system.track_rgbd(images.image, images.depth, i / 20)
@@ -328,3 +330,25 @@ def test_only_the_last_look_is_matched_from_nothing(
     walk.reestimation(frame)
     walk.reestimation(frame, in_doubt=True)
     assert looked == [(frame.id, False), (frame.id, True)]
+
+
+def test_an_aligned_frame_without_images_is_left_alone(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[int] = []
+
+    def note(_: LocalMapSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        looked.append(refined.frame.id)
+        return refined
+
+    class Aligned:
+        def any(self) -> bool:
+            return True
+
+    monkeypatch.setattr(LocalMapSearch, "rematch", note)
+    frame = walk.no_keyframe()
+    monkeypatch.setattr(type(frame), "aligned", Aligned())
+    walk.reestimation(frame)
+    assert looked == []
+    walk.reestimation(frame, in_doubt=True)
+    assert looked == [frame.id]

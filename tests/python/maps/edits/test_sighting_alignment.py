@@ -27,7 +27,9 @@ class Room:
             world="room", sensor=sensor, frames=30, size=(320, 240), fps=8, noise=2.0
         )
         self.sequence = SyntheticSequence(options)
-        with System(self.sequence.settings, sensor, deterministic=True) as system:
+        with System(
+            self.sequence.settings, sensor, deterministic=True, config={"alignment.rgbd": False}
+        ) as system:
             system.run(self.sequence)
             self.contents = system.map_contents()
 
