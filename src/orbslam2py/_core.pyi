@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_frame', 'align_keyframes', 'align_patch', 'align_right_columns', 'align_rotation', 'alignment_noise', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_aligned', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_images', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'release_images', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
+__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InertialFilter', 'InertialKeyframes', 'InertialStart', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PairRectifier', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'PosePrior', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'Rectifier', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WidePair', 'WordVector', 'World', 'add_temporary_points', 'align_frame', 'align_keyframes', 'align_patch', 'align_right_columns', 'align_rotation', 'alignment_noise', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'build_wide_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_aligned', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'estimate_inertial_start', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_images', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'release_images', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'transform_map', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -638,6 +638,193 @@ class Preintegration:
         """
         Samples (n, 7) it was integrated from, with those interpolated at the ends.
         """
+class InertialFilter:
+    """
+    Gaussian over the state of an IMU in a map, from image to image.
+
+    Errors are ordered (rotation [rad], velocity [m/s], position [m], gyro bias [rad/s], accelerometer
+    bias [m/s^2], tilt of gravity about the first two axes of the world [rad], logarithm of the scale):
+    18. That of the rotation acts on the right, velocity and position are added in the world, whose third
+    axis is up. The scale is units of the map per metre.
+    """
+    def __init__(self, T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], T_wb: Pose, velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"], covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[18, 18]"]) -> None:
+        """
+        T_cb: Pose from the IMU to the camera. noise: (4,), densities of gyro and accelerometer, and of the walks of their biases, in the units of `Preintegration`. T_wb, velocity (3,), bias (6,), covariance (18, 18): the state at first.
+        """
+    def distance(self, T_cw: Pose, covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"]) -> float:
+        """
+        Squared Mahalanobis distance of a pose with this covariance: 6 degrees of freedom.
+        """
+    def fuse(self, T_cw: Pose, covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], inflation: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        """
+        Take the pose of an image that was estimated with `pose` as prior, and its covariance. What the image tells counts 1 / inflation times.
+        """
+    def move(self, T_cw: Pose) -> None:
+        """
+        The map was moved: the camera's pose is this one now; the velocity turns with it.
+        """
+    def pose(self) -> tuple[Pose, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]]:
+        """
+        Pose `T_cw` of the camera and its covariance (6, 6): rotation, translation; left perturbation.
+        """
+    def predict(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], scale_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+        """
+        From the first sample (n, 7) to the last. scale_walk: random walk of the logarithm of the scale [1/sqrt(s)]. Raises ValueError as Preintegration does.
+        """
+    def transform(self, scale: typing.SupportsFloat | typing.SupportsIndex, pose: Pose) -> None:
+        """
+        The map was moved: `x' = scale R x + t`. Tilt and scale are 0 afterwards.
+        """
+    def update(self, T_cw: Pose, covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"]) -> None:
+        """
+        Take the pose of an image that was estimated without a prior.
+        """
+    @property
+    def T_wb(self) -> Pose:
+        """
+        Pose of the IMU in the world.
+        """
+    @property
+    def bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        (6,): gyro [rad/s], accelerometer [m/s^2].
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 18]"]:
+        """
+        (18, 18).
+        """
+    @property
+    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        In the world (3,) [m/s^2].
+        """
+    @property
+    def log_scale(self) -> float:
+        """
+        Logarithm of the scale.
+        """
+    @property
+    def tilt(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[2, 1]"]:
+        """
+        Rotation [rad] about the first two axes of the world from (0, 0, -9.81) to gravity (2,).
+        """
+    @property
+    def velocity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Of the IMU in the world (3,) [m/s].
+        """
+class InertialStart:
+    """
+    What estimate_inertial_start found.
+    """
+    @property
+    def bias(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 1]"]:
+        """
+        (6,): gyro [rad/s], accelerometer [m/s^2].
+        """
+    @property
+    def cost(self) -> float:
+        """
+        Weighted sum of squared residuals.
+        """
+    @property
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[18, 18]"]:
+        """
+        (18, 18) of the last view, in the order of InertialFilter, once the map has been turned by `up` and multiplied by `scale`.
+        """
+    @property
+    def freedom(self) -> int:
+        """
+        Degrees of freedom of the cost.
+        """
+    @property
+    def gravity(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
+        """
+        Free fall in the map (3,) [m/s^2].
+        """
+    @property
+    def gravity_deviation(self) -> float:
+        """
+        Of its direction [rad].
+        """
+    @property
+    def gravity_length(self) -> float:
+        """
+        Its length if it is not known to be 9.81: a check.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        Metres per unit of the map.
+        """
+    @property
+    def scale_deviation(self) -> float:
+        """
+        Of the logarithm of the scale.
+        """
+    @property
+    def solved(self) -> bool:
+        """
+        False: the rest means nothing.
+        """
+    @property
+    def up(self) -> Pose:
+        """
+        Pose that turns gravity to (0, 0, -9.81).
+        """
+    @property
+    def velocities(self) -> list[typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]]:
+        """
+        Of the IMU at the views, (3,) each [m/s], in the axes of the map.
+        """
+class Rectifier:
+    """
+    Makes images of a raw camera those of a pinhole that is turned.
+    """
+    def __init__(self, raw: CameraModel, R: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        R (3, 3) turns raw into rectified camera coordinates; the others are of the rectified
+        camera [px]. Raises SettingsError when they are out of range.
+        """
+    def from_raw(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Rectified pixels (n, 2) of raw ones; NaN beside the plane.
+        """
+    def rectify(self, image: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], is_mask: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        The rectified image of a raw one (h, w) or (h, w, channels) uint8: bilinear, or the
+        nearest pixel for a mask; 0 where there is nothing. Raises ImageError for an image of
+        another size.
+        """
+    def to_raw(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Raw pixels (n, 2) of rectified ones; NaN where nothing is seen.
+        """
+class PairRectifier:
+    """
+    Rectifies both images of a pair at the same time, in two threads.
+    """
+    def __init__(self, left: Rectifier, right: Rectifier) -> None:
+        ...
+    def rectify(self, left: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], right: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> tuple[numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.uint8]]:
+        """
+        Rectified images (left, right) of raw ones; see Rectifier.rectify. Raises StateError
+        while another thread uses this object.
+        """
+class WidePair:
+    """
+    A fisheye pair, which is matched along its epipolar curves.
+    """
+    def __init__(self, left: Camera, right: CameraModel, R_right_left: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], t_right_left: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
+        """
+        `left` was made with right_centre; R (3, 3) and t (3,) [m] take left camera coordinates
+        into right ones. Raises SettingsError when the centres differ.
+        """
+    def match(self, left: Extraction, right: Extraction, scales: ScalePyramid) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
+        """
+        (right_u [px], depth [m] along the ray) of the left keypoints, float32, -1: none.
+        """
 class Frame:
     """
     What one image (pair) says: features, depths, words. Arrays are copies; n keypoints.
@@ -677,6 +864,11 @@ class Frame:
         (n, 32) uint8.
         """
     @property
+    def has_images(self) -> bool:
+        """
+        Whether the frame still keeps its image pyramids.
+        """
+    @property
     def id(self) -> int:
         ...
     @property
@@ -693,11 +885,6 @@ class Frame:
     def raw_keypoints(self) -> numpy.typing.NDArray[numpy.float32]:
         """
         (n, 2) float32, pixels of the image as it was given.
-        """
-    @property
-    def has_images(self) -> bool:
-        """
-        Whether the frame still keeps its image pyramids.
         """
     @property
     def right_u(self) -> numpy.typing.NDArray[numpy.float32]:
@@ -781,7 +968,7 @@ class TrackedFrame:
     def T_cw(self, arg1: Pose | None) -> None:
         ...
     @property
-    def aligned(self) -> numpy.typing.NDArray[numpy.bool_]:
+    def aligned(self) -> numpy.typing.NDArray[numpy.bool]:
         """
         (n,) bool, whether a keypoint's point is seen where its patch was aligned.
         """
@@ -842,53 +1029,6 @@ class FrameContext:
     @property
     def scales(self) -> ScalePyramid:
         ...
-class PairRectifier:
-    """
-    Rectifies both images of a pair at the same time, in two threads.
-    """
-    def __init__(self, left: Rectifier, right: Rectifier) -> None:
-        ...
-    def rectify(self, left: numpy.typing.NDArray[numpy.uint8], right: numpy.typing.NDArray[numpy.uint8]) -> tuple[numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.uint8]]:
-        """
-        Rectified images (left, right) of raw ones; see Rectifier.rectify. Raises StateError
-        while another thread uses this object.
-        """
-class Rectifier:
-    """
-    Makes images of a raw camera those of a pinhole that is turned.
-    """
-    def __init__(self, raw: CameraModel, R: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        R (3, 3) turns raw into rectified camera coordinates; the others are of the rectified
-        camera [px]. Raises SettingsError when they are out of range.
-        """
-    def from_raw(self, pixels: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Rectified pixels (n, 2) of raw ones; NaN beside the plane.
-        """
-    def rectify(self, image: numpy.typing.NDArray[numpy.uint8], is_mask: bool = False) -> numpy.typing.NDArray[numpy.uint8]:
-        """
-        The rectified image of a raw one (h, w) or (h, w, channels) uint8: bilinear, or the
-        nearest pixel for a mask; 0 where there is nothing. Raises ImageError for an image of
-        another size.
-        """
-    def to_raw(self, pixels: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Raw pixels (n, 2) of rectified ones; NaN where nothing is seen.
-        """
-class WidePair:
-    """
-    A fisheye pair, which is matched along its epipolar curves.
-    """
-    def __init__(self, left: Camera, right: CameraModel, R_right_left: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], t_right_left: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
-        """
-        `left` was made with right_centre; R (3, 3) and t (3,) [m] take left camera coordinates
-        into right ones. Raises SettingsError when the centres differ.
-        """
-    def match(self, left: Extraction, right: Extraction, scales: ScalePyramid) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
-        """
-        (right_u [px], depth [m] along the ray) of the left keypoints, float32, -1: none.
-        """
 class PairExtractor:
     """
     Extracts left and right images at the same time, in two threads.
@@ -1019,6 +1159,10 @@ class Map:
         """
         Whether the point is alive.
         """
+    def is_upright(self, map: typing.SupportsInt | typing.SupportsIndex) -> bool:
+        """
+        Whether the third axis of the map's world is up, by an IMU, and its unit is the metre. Trajectories of other maps are relative to their first keyframe.
+        """
     def join_maps(self, child: int, parent: int) -> None:
         """
         All of the map of one keyframe belongs to that of the other one from now on.
@@ -1111,6 +1255,10 @@ class Map:
     def set_position(self, id: int, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         """
         Move a living point (world coordinates).
+        """
+    def set_upright(self, map: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Note that it is so.
         """
     def update_connections(self, id: int) -> None:
         """
@@ -2330,6 +2478,25 @@ class PoseEstimate:
         """
         Per observation (n,) uint8; empty when a frame was given, which holds its own flags.
         """
+class PosePrior:
+    """
+    Gaussian of a pose: `T_cw = exp(e) mean`, with `e` (rotation [rad],
+    translation) of mean zero.
+    """
+    def __init__(self, mean: Pose, information: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"]) -> None:
+        """
+        mean: Pose `T_cw`. information: (6, 6) float64, inverse of the covariance.
+        """
+    @property
+    def information(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+        """
+        (6, 6) float64.
+        """
+    @property
+    def mean(self) -> Pose:
+        """
+        Pose `T_cw`.
+        """
 class FrameSightings:
     """
     What frames saw of the map, so that their poses can follow its points.
@@ -2461,6 +2628,32 @@ class BundleSummary:
         """
         A time limit ended it; what was reached is used.
         """
+class InertialKeyframes:
+    """
+    Samples of an IMU, and its velocities and biases at keyframes.
+    """
+    def __init__(self, T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"]) -> None:
+        """
+        As of InertialFilter.
+        """
+    def __len__(self) -> int:
+        ...
+    def add_samples(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Samples (n, 7) after those before, which they may overlap by one.
+        """
+    def clear(self) -> None:
+        """
+        Forget everything.
+        """
+    def find(self, keyframe: int) -> typing.Any:
+        """
+        Velocity (3,) and bias (6,) of a keyframe, as of `set`; or None.
+        """
+    def set(self, keyframe: int, velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]) -> None:
+        """
+        Velocity of the IMU (3,) [m/s] in the axes of the camera of a keyframe that was just inserted, and its bias (6,).
+        """
 class LocalBundleResult:
     """
     What local_bundle_adjustment did.
@@ -2479,6 +2672,11 @@ class LocalBundleResult:
     def n_fixed_keyframes(self) -> int:
         """
         Cameras held still, local or not.
+        """
+    @property
+    def n_imu_links(self) -> int:
+        """
+        Residuals of the IMU.
         """
     @property
     def n_local_keyframes(self) -> int:
@@ -3491,6 +3689,12 @@ def discard_temporary(frame: TrackedFrame) -> int:
     """
     Drop the frame's associations with temporary points; their number.
     """
+def estimate_inertial_start(times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], T_wc: collections.abc.Sequence[Pose], samples: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], *, metric: bool, rotation_deviation: typing.SupportsFloat | typing.SupportsIndex, position_deviation: typing.SupportsFloat | typing.SupportsIndex, bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"] = ..., gyro_deviation: typing.SupportsFloat | typing.SupportsIndex = 0.1, accel_deviation: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> InertialStart:
+    """
+    Gravity, scale, biases and velocities from poses of the camera in a map and the samples between them (Campos et al., ICRA 2020).
+
+    times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of InertialFilter. metric: the unit of the map is the metre. Deviations of the views' rotations [rad] and positions [units of the map]; bias (6,) with the deviations of gyro [rad/s] and accelerometer [m/s^2]: what is known before. Raises ValueError.
+    """
 def figure_eight_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
     The round through make_figure_eight; twice along the middle leg.
@@ -3564,12 +3768,15 @@ def keyframes_of_seam(map: Map, current: int) -> numpy.typing.NDArray[numpy.int6
     """
     The keyframe and its neighbours, ascending: (n,) int64.
     """
-def local_bundle_adjustment(map: Map, keyframe: int, abort: StopFlag | None = None, monocular: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, solver: str = 'blocks', measures_noise: bool = False) -> LocalBundleResult:
+def local_bundle_adjustment(map: Map, keyframe: int, abort: StopFlag | None = None, monocular: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, solver: str = 'blocks', inertial: InertialKeyframes | None = None, measures_noise: bool = False) -> LocalBundleResult:
     """
     Refine a keyframe, its neighbours and all their points; other observers are fixed.
 
     `abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for
-    the scale. `solver`: of BundleOptions. Takes the map's locks for short sections only. A
+    the scale. `solver`: of BundleOptions. `inertial`: InertialKeyframes, whose newest ones are
+    local, too, with residuals of the IMU between them; or None. `measures_noise`:
+    alignment_noise() follows the residuals of aligned sightings. Takes the map's locks for
+    short sections only. A
     dead or unknown keyframe gives an empty result, a reset meanwhile drops it.
     """
 def lowest_neighbour_score(map: Map, id: int) -> float:
@@ -3688,7 +3895,7 @@ def optimize_essential_graph(correction: LoopCorrection, abort: StopFlag | None 
     every run. Returns a PoseGraphSummary.
     """
 @typing.overload
-def optimize_pose(frame: TrackedFrame, prior: PosePrior | None = None) -> PoseEstimate:
+def optimize_pose(frame: TrackedFrame, prior: PosePrior = None) -> PoseEstimate:
     """
     Pose of a frame from its associated points, starting at its T_cw; writes T_cw and the
     outlier flags. Four rounds of damped least squares with a Huber kernel (off in the last);
@@ -3871,6 +4078,10 @@ def to_grey(image: numpy.ndarray, is_rgb: bool) -> numpy.ndarray:
 def train_vocabulary(descriptors: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], image_ends: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], options: TrainingOptions, progress: typing.Any = None) -> Vocabulary:
     """
     Hierarchical k-means over the descriptors of all training images, (n, 32) uint8, one image after the other; image_ends: one past the last descriptor of each image. progress(fraction) is called on this thread; returning False cancels, and None is returned. Raises SettingsError or VocabularyError.
+    """
+def transform_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex, scale: typing.SupportsFloat | typing.SupportsIndex, pose: Pose) -> None:
+    """
+    Move all keyframes and points of a map: `x' = scale R x + t` with R, t of the pose. Counts as a big change; nobody may work on the map meanwhile.
     """
 def triangulate(ray_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], ray_2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], T_1w: Pose, T_2w: Pose) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"] | None:
     """
