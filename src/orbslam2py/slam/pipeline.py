@@ -296,6 +296,7 @@ class Pipeline:
         check, tracker = self.inertial.check, self.inertial_tracker
         if check is not None and tracker is not None:
             tracker.allowed = check.verdict is not ImuVerdict.HELD_BACK
+            tracker.may_start = check.verdict is ImuVerdict.FITS
         return self.inertial.take(timestamp)
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingResult) -> None:

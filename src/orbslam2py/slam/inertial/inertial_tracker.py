@@ -114,6 +114,8 @@ class InertialTracker:
         self._aligned_at = -math.inf
         #: May the IMU be used at all; the check of the IMU takes it back.
         self.allowed = True
+        #: May the IMU start; the check of the IMU allows it once it has found that the IMU fits.
+        self.may_start = True
 
     # ---- before an image is searched -------------------------------------------------------------
     def predict(self, interval: ImuInterval | None, state: State, timestamp: float) -> State:
@@ -327,7 +329,10 @@ class InertialTracker:
     def _start(self, state: State) -> State:
         views = self._views.views
         due = (
-            self._new_view and len(views) >= _LEAST_VIEWS and self._views.seconds >= _LEAST_SECONDS
+            self.may_start
+            and self._new_view
+            and len(views) >= _LEAST_VIEWS
+            and self._views.seconds >= _LEAST_SECONDS
         )
         if not due or not self._idle():
             return state
