@@ -45,7 +45,7 @@ Problem random_problem(std::uint64_t seed, std::size_t n) {
   return problem;
 }
 
-double distance(const Pose& a, const Pose& b) { return (a * b.inverse()).log().norm(); }
+double pose_distance(const Pose& a, const Pose& b) { return (a * b.inverse()).log().norm(); }
 
 TEST(PosePrior, OneHalfOfTheObservationsAsPriorOfTheOtherGivesTheResultOfAll) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
@@ -72,7 +72,7 @@ TEST(PosePrior, OneHalfOfTheObservationsAsPriorOfTheOtherGivesTheResultOfAll) {
     prior.information = of_first.covariance.inverse() * variance;
     const PoseEstimate together = optimize_pose(problem.start, *problem.camera, second, &prior);
     const PoseEstimate expected = optimize_pose(problem.start, *problem.camera, all);
-    EXPECT_LT(distance(together.T_cw, expected.T_cw), 0.05 * distance(of_first.T_cw, expected.T_cw))
+    EXPECT_LT(pose_distance(together.T_cw, expected.T_cw), 0.05 * pose_distance(of_first.T_cw, expected.T_cw))
         << "seed " << seed;
   }
 }
@@ -88,8 +88,8 @@ TEST(PosePrior, PullsTowardsItsMeanByItsInformation) {
   const auto with = [&](const PosePrior& prior) {
     return optimize_pose(problem.start, *problem.camera, problem.observations, &prior);
   };
-  EXPECT_LT(distance(with(weak).T_cw, alone.T_cw), 1e-6);
-  EXPECT_LT(distance(with(certain).T_cw, mean), 1e-6);
+  EXPECT_LT(pose_distance(with(weak).T_cw, alone.T_cw), 1e-6);
+  EXPECT_LT(pose_distance(with(certain).T_cw, mean), 1e-6);
   EXPECT_LT(with(certain).covariance.trace(), 7e-12);
 }
 
@@ -131,11 +131,11 @@ TEST(PosePrior, FewObservationsLeaveTheMean) {
   const PosePrior prior{problem.truth, 1e4 * Matrix6d::Identity()};
   const PoseEstimate estimate =
       optimize_pose(problem.start, *problem.camera, problem.observations, &prior);
-  EXPECT_LT(distance(estimate.T_cw, problem.truth), 1e-15);
+  EXPECT_LT(pose_distance(estimate.T_cw, problem.truth), 1e-15);
   EXPECT_EQ(estimate.n_inliers, 0);
   EXPECT_NEAR(estimate.covariance(0, 0), 1e-4, 1e-10);
   problem.observations.clear();
-  EXPECT_LT(distance(optimize_pose(problem.start, *problem.camera, {}, &prior).T_cw, problem.truth),
+  EXPECT_LT(pose_distance(optimize_pose(problem.start, *problem.camera, {}, &prior).T_cw, problem.truth),
             1e-15);
 }
 
