@@ -42,7 +42,7 @@ Observed observed(const Camera& camera, double noise, bool with_depth) {
     o.v = seen.y();
     o.has_depth = with_depth && p.z() > 0.5 && all.observations.size() % 2 == 0;
     // Disparities are measured beside the error of the pixel.
-    o.right_u = o.u - camera.bf() / p.z();
+    o.right_u = o.u - camera.disparity(p);
     all.observations.push_back(o);
   }
   return all;

@@ -85,7 +85,7 @@ double scale_of(const BundleProblem& problem) {
 }
 
 TEST(InertialBundle, OneCameraBecomesMetric) {
-  BundleProblem problem = one_camera(12, 1);
+  BundleProblem problem = one_camera(30, 1);
   EXPECT_NEAR(scale_of(problem), 1.03, 1e-6);
   BundleOptions options;
   options.final_iterations = 20;

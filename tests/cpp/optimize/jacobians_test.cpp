@@ -244,7 +244,7 @@ TEST(Jacobians, PoseKernels) {
             Eigen::Vector3d measured = Eigen::Vector3d::Zero();
             measured.head(rows) = prediction + Eigen::VectorXd::Unit(rows, row);
             pose_kernels::Group group;
-            group.push_back(p_w, measured.x(), measured.y(), measured.z(), weight, 0);
+            group.push_back(p_w, measured.x(), measured.y(), measured.z(), weight, 1, 0);
             group.pad();
             pose_kernels::NormalEquations equations;
             (rows == 3 ? pose_kernels::accumulate_stereo : pose_kernels::accumulate_mono)(
