@@ -206,8 +206,8 @@ class System:
         Parameters
         ----------
         images : array, sequence of two arrays, or images
-            One camera: the image. Stereo: left and right, rectified and synchronised. RGB-D: image
-            and registered depth. Or `orbslam2py.datasets.Images` of a sequence.
+            One camera: the image. Stereo: left and right, synchronised; raw ones are rectified by
+            the settings. RGB-D: image and registered depth. Or `orbslam2py.datasets.Images` of a sequence.
 
             Images are uint8 (h, w), (h, w, 3) or (h, w, 4), grey or colour (order by ``Camera.RGB``
             of the settings). Depth is (h, w) of any number type; divided by ``DepthMapFactor`` it
@@ -221,8 +221,9 @@ class System:
         imu : array of float64 (n, 7), optional
             Samples of an IMU since the image before, rows ``[t, gyro x, y, z, accelerometer x, y,
             z]``: seconds on the clock of the IMU, rad/s, m/s^2. A sample after the image helps to
-            interpolate. Tracking does not use them yet; they are compared with the path of the
-            camera, and a warning says what is wrong with them. The call never waits for samples.
+            interpolate. They are compared with the path of the camera; a warning says what is wrong
+            with them. Once they fit, they predict poses, and for up to 5 s replace those that
+            images do not give. The call never waits for samples.
 
         Returns
         -------
