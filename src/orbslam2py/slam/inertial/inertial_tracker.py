@@ -44,7 +44,7 @@ _GRAVITY_OFF = 1.5
 #: Deviations of a bias before anything is known: gyro [rad/s], accelerometer [m/s^2].
 _FIRST_BIAS = (0.1, 0.2)
 #: Factor on the stated deviations of views, and their least values: rad, share of the position.
-_VIEW_FACTOR, _LEAST_TURN = 3.0, 2e-3
+_VIEW_FACTOR, _LEAST_TURN = 1.5, 2e-3
 # ---- filter ----
 #: Seconds in which the errors of map points are common to all images: together they count as one.
 _COMMON = 0.5
