@@ -207,7 +207,8 @@ class System:
         ----------
         images : array, sequence of two arrays, or images
             One camera: the image. Stereo: left and right, synchronised; raw ones are rectified by
-            the settings. RGB-D: image and registered depth. Or `orbslam2py.datasets.Images` of a sequence.
+            the settings. RGB-D: image and registered depth. Or `orbslam2py.datasets.Images` of a
+            sequence.
 
             Images are uint8 (h, w), (h, w, 3) or (h, w, 4), grey or colour (order by ``Camera.RGB``
             of the settings). Depth is (h, w) of any number type; divided by ``DepthMapFactor`` it

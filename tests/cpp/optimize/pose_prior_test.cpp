@@ -72,7 +72,8 @@ TEST(PosePrior, OneHalfOfTheObservationsAsPriorOfTheOtherGivesTheResultOfAll) {
     prior.information = of_first.covariance.inverse() * variance;
     const PoseEstimate together = optimize_pose(problem.start, *problem.camera, second, &prior);
     const PoseEstimate expected = optimize_pose(problem.start, *problem.camera, all);
-    EXPECT_LT(pose_distance(together.T_cw, expected.T_cw), 0.05 * pose_distance(of_first.T_cw, expected.T_cw))
+    EXPECT_LT(pose_distance(together.T_cw, expected.T_cw),
+              0.05 * pose_distance(of_first.T_cw, expected.T_cw))
         << "seed " << seed;
   }
 }
@@ -135,8 +136,9 @@ TEST(PosePrior, FewObservationsLeaveTheMean) {
   EXPECT_EQ(estimate.n_inliers, 0);
   EXPECT_NEAR(estimate.covariance(0, 0), 1e-4, 1e-10);
   problem.observations.clear();
-  EXPECT_LT(pose_distance(optimize_pose(problem.start, *problem.camera, {}, &prior).T_cw, problem.truth),
-            1e-15);
+  EXPECT_LT(
+      pose_distance(optimize_pose(problem.start, *problem.camera, {}, &prior).T_cw, problem.truth),
+      1e-15);
 }
 
 }  // namespace
