@@ -319,7 +319,7 @@ class AlignmentConfig:
     """Which positions are measured by aligning patches of grey values."""
 
     rgbd: bool = True
-    """Align with an RGB-D camera."""
+    """Align with an RGB-D camera and 1000 features or more."""
     stereo: bool = False
     """Align with a stereo pair; helps where the rectification is exact."""
     monocular: bool = False
@@ -404,10 +404,15 @@ class Config:
         return {name: value for name, value in all_values(self) if value != value_of(usual, name)}
 
     def for_features(self, n_features: int) -> Config:
-        """Return the configuration for this number of features: with few, fewer inliers."""
+        """Return the configuration for this number of features.
+
+        With fewer than usual, fewer inliers are required. Sightings are not aligned then: in fast
+        motion the few inliers are lost (``docs/method/alignment.md``).
+        """
         share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
         changes = {name: math.ceil(share * value_of(self, name)) for name in _INLIERS}
-        return self.with_changes(changes)
+        aligned = self.alignment.rgbd and n_features >= USUAL_FEATURES
+        return self.with_changes({**changes, "alignment.rgbd": aligned})
 
 
 #: Named sets of changes to the defaults.

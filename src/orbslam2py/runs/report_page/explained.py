@@ -209,6 +209,7 @@ STAGES_BESIDE = {
     "mapping.cull_points": "taking out new points that too few frames find",
     "mapping.new_points": "making points from matches with neighbouring keyframes",
     "mapping.fuse": "joining points that are one and the same",
+    "mapping.align": "aligning the sightings of points to each other by patches",
     "mapping.local_bundle_adjustment": "refining the keyframes and points around the newest",
     "mapping.cull_keyframes": "taking out keyframes that others make superfluous",
     "loop.detect": "looking for a place seen before",
