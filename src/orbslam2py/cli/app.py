@@ -138,7 +138,7 @@ SUBCOMMANDS = {
     "calibrate": Subcommand(
         "calibrate",
         "calibrate",
-        "Calibrate a camera with a chessboard; write a settings file that run takes.",
+        "Calibrate a camera, a stereo pair or a rig with a board; write settings that run takes.",
     ),
     "import-camera": Subcommand(
         "calibrate",

@@ -87,8 +87,11 @@ def find_imu(
         if settings is None:
             settings = imu_settings_of(source)
         if settings is None:
-            if must:
-                raise SettingsError(_NO_SETTINGS.format(name=name))
+            problem = _NO_SETTINGS.format(name=name)
+            if must and not is_live:
+                raise SettingsError(problem)
+            if must:  # its samples can be recorded all the same
+                _log.warning("the IMU is not used: %s", problem)
             return None
         if is_live:
             return ImuOfRun(settings, None)

@@ -186,7 +186,7 @@ def _rectification_of_models(
         sides.append(
             CameraRectification(
                 K=np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]),
-                D=np.array(model.parameters[4:]),
+                D=np.array(model.parameters[4:] if len(model.parameters) > 4 else np.zeros(4)),
                 R=R,
                 P=P,
                 width=width,

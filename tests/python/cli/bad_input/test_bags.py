@@ -57,9 +57,9 @@ CASES: dict[str, tuple[list[bags.Made], tuple[str, ...], tuple[str, ...]]] = {
     "behind": ([*PAIR, shift(-0.1, 0)], (), ("to the left of the other one", "exchange the two")),
     "half": (PAIR[:3], (), ("no CameraInfo for /cam2/image", "--topics right_info=")),
     "fish": (
-        [*camera("cam1", model="equidistant"), *camera("cam2"), shift(0.1, 0)],
+        [*camera("cam1", model="polynomial"), *camera("cam2"), shift(0.1, 0)],
         (),
-        ("the distortion model equidistant is not supported", "--settings"),
+        ("the distortion model polynomial is not supported", "--settings"),
     ),
     "depth": (
         RGBD,
