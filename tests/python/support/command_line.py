@@ -49,17 +49,25 @@ class Outcome:
 
 @contextmanager
 def logging_restored() -> Iterator[None]:
-    """The command directs the package's log to its own console."""
+    """The command directs the package's log to its own console, and sets levels of some rooms."""
     logger = logging.getLogger("orbslam2py")
-    datasets = logging.getLogger("orbslam2py.datasets")
-    before = logger.handlers, logger.propagate, logger.level
-    level_of_datasets = datasets.level
+    before = logger.handlers, logger.propagate
+    levels = {each: each.level for each in (logger, *_children(logger))}
     try:
         yield
     finally:
-        logger.handlers, logger.propagate, level = before
-        logger.setLevel(level)
-        datasets.setLevel(level_of_datasets)
+        logger.handlers, logger.propagate = before
+        for each in (logger, *_children(logger)):
+            each.setLevel(levels.get(each, logging.NOTSET))
+
+
+def _children(logger: logging.Logger) -> list[logging.Logger]:
+    known = list(logging.Logger.manager.loggerDict.values())
+    return [
+        each
+        for each in known
+        if isinstance(each, logging.Logger) and each.name.startswith(f"{logger.name}.")
+    ]
 
 
 _get_command = typer.main.get_command
