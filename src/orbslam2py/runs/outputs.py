@@ -47,7 +47,7 @@ _SETTINGS = "settings.yaml"
 _NOT_ALWAYS = (
     *("trajectory.txt", "trajectory_online.txt", "trajectory_kitti.txt", "keyframes.txt"),
     *("trajectory.png", "maps.png", "trajectory_map*.txt", "groundtruth_aligned.txt"),
-    *("report.html", "frame_images.zip", "imu_states.csv"),
+    *("report.html", "frame_images.zip", "imu_states.csv", "imu.yaml"),
 )
 
 #: By it a folder is known as that of a run: the first to come, without frames, the last to go.
@@ -242,6 +242,8 @@ class OutputWriter:
         if has_imu_states(result.rows):
             self._write("imu_states.csv", lambda path: write_imu_states(path, result.rows))
         self._write(_SETTINGS, result.settings.save)
+        if result.imu_settings is not None:
+            self._write("imu.yaml", result.imu_settings.save)
         self._write_trajectories(result, evaluation)
         points = anchored_points(result)
         unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"

@@ -15,6 +15,7 @@ from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.snapshot import MapSnapshot
 from orbslam2py.runs.kept_images import KeptImages
 from orbslam2py.runs.options import RunOptions
+from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
@@ -110,6 +111,8 @@ class RunResult:
     """Of the first depth images [m]; None without depth."""
     imu: dict[str, Any] | None = None
     """What is known of the IMU, as in ``report.json``; None without one."""
+    imu_settings: ImuSettings | None = None
+    """Noise, place and clock of the IMU that the run used; None without one."""
     warnings: list[str] = field(default_factory=list)
     """Warnings about the result: a calibration that does not fit, a loss until the end."""
     calibration_warnings: list[str] = field(default_factory=list)

@@ -175,6 +175,8 @@ class SequenceRunner:
         result.warnings += getattr(result.sequence, "doubts", ())  # logged when it was opened
         result.warnings += system.settings.doubts()  # which the system has logged
         self._judge_depth(system)
+        if self._imu is not None:
+            result.imu_settings = self._imu.settings
         if system.imu_check is not None:
             result.imu = imu_entry(system.imu_check, system.pipeline.inertial.n_samples)
             result.warnings += [fault.text for fault in system.imu_check.faults]

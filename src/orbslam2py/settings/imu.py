@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from os import PathLike
 
 import numpy as np
 
 from orbslam2py._arguments import is_number, shown
 from orbslam2py._arrays import EqualByValue, FloatArray
+from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
 
 #: Largest departure of R R^T from the identity of a matrix written with four digits or more.
@@ -154,6 +156,35 @@ class ImuSettings(EqualByValue):
         turn = np.eye(4)
         turn[:3, :3] = R
         return replace(self, T_ci=turn @ self.T_ci)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a file with the keys of ORB-SLAM3; `read_imu_settings` reads equal settings.
+
+        Parameters
+        ----------
+        path
+            The file; replaced only after everything is written.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written; an existing file is kept then.
+        """
+        T_ic = np.linalg.inv(self.T_ci)
+        matrix = ", ".join(repr(float(value) + 0.0) for value in T_ic.ravel())
+        lines = [
+            "%YAML:1.0",
+            f"IMU.NoiseGyro: {self.gyro_noise!r}",
+            f"IMU.NoiseAcc: {self.accel_noise!r}",
+            f"IMU.GyroWalk: {self.gyro_walk!r}",
+            f"IMU.AccWalk: {self.accel_walk!r}",
+            *([] if self.rate is None else [f"IMU.Frequency: {float(self.rate)!r}"]),
+            *([f"IMU.TimeOffset: {float(self.time_offset)!r}"] if self.time_offset else []),
+            "IMU.T_b_c1: !!opencv-matrix",
+            *("   rows: 4", "   cols: 4", "   dt: d", f"   data: [{matrix}]"),
+        ]
+        with atomic_write(path) as stream:
+            stream.write("\n".join(lines) + "\n")
 
 
 def rigid_transform(value: object) -> FloatArray:

@@ -148,20 +148,7 @@ def write_imu(folder: Path, samples: ImuSamples, settings: ImuSettings) -> None:
     """Write ``imu.csv``, and ``imu.yaml`` with the keys of ORB-SLAM3."""
     names = [f"{kind}_{axis} [{unit}]" for kind, unit in _COLUMNS for axis in "xyz"]
     _write_table(folder / TABLE, "timestamp [s]," + ",".join(names), samples, 1)
-    lines = [
-        "%YAML:1.0",
-        f"IMU.NoiseGyro: {settings.gyro_noise!r}",
-        f"IMU.NoiseAcc: {settings.accel_noise!r}",
-        f"IMU.GyroWalk: {settings.gyro_walk!r}",
-        f"IMU.AccWalk: {settings.accel_walk!r}",
-        f"IMU.Frequency: {settings.rate!r}",
-        "IMU.T_b_c1: !!opencv-matrix",
-        "   rows: 4",
-        "   cols: 4",
-        "   dt: d",
-        f"   data: [{_numbers(inverse_poses(settings.T_ci).ravel(), ', ')}]",
-    ]
-    (folder / SETTINGS).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    settings.save(folder / SETTINGS)
 
 
 _COLUMNS = (("gyro", "rad/s"), ("accel", "m/s^2"))

@@ -120,7 +120,7 @@ def tables_below(heading: str) -> list[str]:
 
 def test_files_page_lists_the_files(run: Path) -> None:
     page = first_column("Files of a run")
-    with_several = ("trajectory_map", "maps.png", "imu_states.csv")
+    with_several = ("trajectory_map", "maps.png", "imu_states.csv", "imu.yaml")
     always = {name for name in page if not name.startswith(with_several)}
     assert {path.name for path in run.iterdir()} == always
 

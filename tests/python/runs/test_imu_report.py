@@ -13,6 +13,7 @@ from orbslam2py.runs import RunOptions, SequenceRunner, SystemOptions
 from orbslam2py.runs.outputs import OutputWriter
 from orbslam2py.runs.report import make_report
 from orbslam2py.runs.result import RunResult
+from orbslam2py.settings import read_imu_settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 OPTIONS = SyntheticOptions(world="room", sensor="rgbd", frames=6, size=(320, 240), imu=True)
@@ -43,6 +44,8 @@ def with_states(result: RunResult) -> RunResult:
 def test_states_over_time_and_the_page(tmp_path: Path) -> None:
     result = with_states(run())
     OutputWriter(tmp_path).write_all(result, make_report(result, None), None)
+    assert result.imu_settings is not None
+    assert read_imu_settings(tmp_path / "imu.yaml") == result.imu_settings
     head, *lines = (tmp_path / "imu_states.csv").read_text().splitlines()
     assert head.startswith("frame,timestamp,vx,vy,vz,gyro_bias_x,")
     assert len(lines) == 4

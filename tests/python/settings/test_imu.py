@@ -3,6 +3,7 @@
 
 import json
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,6 +99,15 @@ def test_the_offset_of_kalibr(tmp_path):
     files = dict(FILES["kalibr"])
     files["camchain.yaml"] = files["camchain.yaml"].replace("imu: 0.0", "imu: -0.0125")
     assert read_imu_settings(*written(tmp_path, files)).time_offset == -0.0125
+
+
+@pytest.mark.parametrize("rate", [None, 200.0])
+def test_saved_settings_are_read_back(tmp_path, rate):
+    saved = ImuSettings(**NOISE, T_ci=T_CI, time_offset=-0.0125, rate=rate)
+    saved.save(tmp_path / "imu.yaml")
+    read = read_imu_settings(tmp_path / "imu.yaml")
+    np.testing.assert_allclose(read.T_ci, T_CI, atol=1e-15)
+    assert replace(read, T_ci=saved.T_ci) == saved
 
 
 def test_a_preset_fills_in_the_noise(tmp_path):
