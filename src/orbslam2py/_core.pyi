@@ -72,6 +72,10 @@ class Pose:
         """
         Tangent vector (6,); rotation angle in [0, pi].
         """
+    def power(self, exponent: typing.SupportsFloat | typing.SupportsIndex) -> Pose:
+        """
+        The motion `exponent` times, `exp(exponent * log)`: half of it, or its inverse for -1.
+        """
     @property
     def center(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]:
         """

@@ -124,6 +124,11 @@ Tangent vectors are (6,) float64: rotation (radians) first, then translation; th
       .def_property_readonly("quaternion_xyzw", &quaternion_xyzw, "Unit quaternion (4,), x y z w.")
       .def_property_readonly("center", &Pose::center,
                              "For `T_cw` the camera centre in the world, -R^T t, (3,).")
+      .def(
+          "power",
+          [](const Pose& pose, double exponent) { return Pose::exp(exponent * pose.log()); },
+          py::arg("exponent"),
+          "The motion `exponent` times, `exp(exponent * log)`: half of it, or its inverse for -1.")
       .def("inverse", &Pose::inverse, "The inverse transform: `T_ab` gives `T_ba`.")
       .def(
           "__matmul__", [](const Pose& a, const Pose& b) { return a * b; }, py::arg("other"),

@@ -9,13 +9,13 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
+from orbslam2py._values import replace
 from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.inertial import ImuInterval, InertialTracker

@@ -241,6 +241,7 @@ def test_pose_algebra() -> None:
     xi = np.array([0.3, -0.2, 0.9, 1.0, -2.0, 3.0])
     pose = _core.Pose.exp(xi)
     np.testing.assert_allclose(pose.log(), xi, atol=1e-12)
+    np.testing.assert_allclose(pose.power(0.5).log(), np.multiply(0.5, xi), atol=1e-12)
     other = _core.Pose.exp(-0.5 * xi[::-1])
     np.testing.assert_allclose((pose @ other).matrix, pose.matrix @ other.matrix, atol=1e-12)
     np.testing.assert_allclose((pose @ pose.inverse()).matrix, np.eye(4), atol=1e-12)

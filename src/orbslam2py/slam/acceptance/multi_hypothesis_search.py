@@ -7,9 +7,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, PoseMethod, Reason, Verdict

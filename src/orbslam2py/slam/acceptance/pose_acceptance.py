@@ -6,9 +6,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.slam.acceptance.multi_hypothesis_search import Hypothesis, MultiHypothesisSearch
 from orbslam2py.slam.acceptance.pose_validator import PoseValidator, statistics_of
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose

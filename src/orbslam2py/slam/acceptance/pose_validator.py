@@ -7,10 +7,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py._values import replace
 from orbslam2py.slam.config import AcceptanceConfig
 from orbslam2py.slam.pose_search import RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, TrackingState, Verdict

@@ -233,7 +233,7 @@ def _verdicts(candidate: Candidate, third: ThirdView, last: core.Frame) -> Float
 
 def on_the_way(T_21: core.Pose) -> list[core.Pose]:
     """Return possible poses of a view between the first view and the last."""
-    return [core.Pose.exp(share * T_21.log()) for share in (0.5, 0.0, 1.0)]
+    return [T_21.power(share) for share in (0.5, 0.0, 1.0)]
 
 
 def pose_of_view(

@@ -8,9 +8,8 @@ sections V-B and V-C; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-F.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.slam.pose_search.search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.state import State

@@ -6,13 +6,14 @@ Mur-Artal, Montiel and Tardos, 2015, section V-D; ``docs/method/tracking.md#loca
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
+from orbslam2py._values import replace
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import AlignmentConfig, TrackingConfig
 from orbslam2py.slam.records import PoseEstimate, Reason

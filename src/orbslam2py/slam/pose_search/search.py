@@ -6,9 +6,8 @@ Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import AlignmentConfig, TrackingConfig
 from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch, RefinedPose

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
+from orbslam2py._values import replace
 from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.state.motion import Velocity
 

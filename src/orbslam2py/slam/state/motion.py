@@ -7,12 +7,13 @@ Mur-Artal, Montiel and Tardos, 2015, section V-B; ``docs/method/tracking.md``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py._values import replace
 
 #: Seconds over which a velocity is taken to be constant.
 _LONGEST = 1.0
@@ -38,7 +39,7 @@ class Velocity:
         if abs(seconds - self.seconds) <= _SAME_INTERVAL * abs(self.seconds):
             return self.step
         seconds = math.copysign(min(abs(seconds), _LONGEST), seconds)
-        return core.Pose.exp(seconds / self.seconds * self.step.log())
+        return self.step.power(seconds / self.seconds)
 
     def scaled(self, scale_change: float) -> Velocity:
         """Return the velocity after a loop has corrected the scale of a single camera's map."""

@@ -7,8 +7,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from orbslam2py._values import replace
 from orbslam2py.slam.config import AcceptanceConfig
 
 _GAIN = 0.25  # weight of the newest frame in the running means: they forget within some frames

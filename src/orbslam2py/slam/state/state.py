@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.records import TrackingState
 from orbslam2py.slam.state.loss import LostSearch, LostTime, Unconfirmed

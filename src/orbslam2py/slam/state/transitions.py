@@ -6,9 +6,10 @@ The table of all transitions is in ``docs/method/tracking.md#state``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from orbslam2py import _core as core
+from orbslam2py._values import replace
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.records import TrackingState
 from orbslam2py.slam.state.loss import (
