@@ -76,6 +76,10 @@ class Cameras(ArrayGroup):
     lens: FloatArray
     """(c, 16) parameters of that model, zeros after the last one. The last three are the centre of
     the right camera of a fisheye pair in the frame of the left one [m], zeros if there is none."""
+    mount: FloatArray
+    """(c, 12) of the cameras of rigs, which follow all others: the row of their rig, 1 if their
+    keypoints are used, camera to body as quaternion x, y, z, w and translation [m], and the centre
+    of the camera that gives them depths [m]. Of other cameras and of rigs -1 and zeros."""
 
     def __len__(self) -> int:
         return len(self.fx)
@@ -87,7 +91,9 @@ class Cameras(ArrayGroup):
         parameters = [len(one) for _, _, one in _core.camera_models()]
         pairs = [n > 0 and parameters[n - 1] <= RIGHT_CENTRE.start for n in self.model.tolist()]
         lens[pairs, RIGHT_CENTRE] *= scale
-        return replace(self, bf=scale * self.bf, lens=lens)
+        mount = self.mount.copy()
+        mount[:, 6:] *= scale
+        return replace(self, bf=scale * self.bf, lens=lens, mount=mount)
 
     def camera_model(self, row: int) -> CameraModel | None:
         """Return the model of a fisheye lens, or None for a pinhole."""
@@ -97,6 +103,17 @@ class Cameras(ArrayGroup):
         name, _, parameters = _core.camera_models()[number - 1]
         size = (int(self.width[row]), int(self.height[row]))
         return CameraModel(name, self.lens[row, : len(parameters)], size)
+
+
+#: Numbers that `Cameras.mount` has of a camera.
+MOUNT_SIZE = 12
+
+
+def no_mounts(n: int) -> FloatArray:
+    """Return `Cameras.mount` of cameras that belong to no rig."""
+    mounts = np.zeros((n, MOUNT_SIZE))
+    mounts[:, 0] = -1
+    return mounts
 
 
 #: Numbers that a map file keeps of a camera model.

@@ -66,7 +66,7 @@ def rig_of_text(
             f"{path} describes no rig: it needs the cameras as Camera1.*, Camera2.*, ... (fx, fy, "
             "cx, cy, width, height, lens) and Camera2.T_c1_c2 for how camera 2 is mounted. A "
             "camchain of Kalibr becomes such a file with\n"
-            "    orbslam2py settings import-camera camchain.yaml --sensor rig -o my_rig.yaml"
+            "    orbslam2py import-camera camchain.yaml --sensor rig -o my_rig.yaml"
         )
     if numbers != list(range(1, len(numbers) + 1)):
         raise SettingsError(
