@@ -95,6 +95,41 @@ class Cameras(ArrayGroup):
         mount[:, 6:] *= scale
         return replace(self, bf=scale * self.bf, lens=lens, mount=mount)
 
+    @property
+    def has_rigs(self) -> bool:
+        """Whether keyframes have several cameras, whose images lie side by side in one plane."""
+        return bool((self.mount[:, 0] >= 0).any())
+
+    def rig(self, row: int) -> _core.Camera | None:
+        """Return the cameras of a rig as one of the core; None for a single camera."""
+        rows = np.flatnonzero(self.mount[:, 0] == row).tolist()
+        if not rows:
+            return None
+        cameras, poses = [], []
+        for own in rows:
+            lens: dict[str, Any] = {}
+            model = self.camera_model(own)
+            if model is not None:
+                lens["model"] = model.core
+            cameras.append(
+                _core.Camera(
+                    _core.CameraOptions(
+                        fx=self.fx[own],
+                        fy=self.fy[own],
+                        cx=self.cx[own],
+                        cy=self.cy[own],
+                        width=int(self.width[own]),
+                        height=int(self.height[own]),
+                        distortion=self.distortion[own].tolist(),
+                        bf=self.bf[own],
+                        depth_ratio=self.depth_ratio[own],
+                        **lens,
+                    )
+                )
+            )
+            poses.append(_core.Pose(self.mount[own, 2:6], self.mount[own, 6:9]))
+        return _core.Camera.rig(cameras, poses, [True] * len(rows))
+
     def camera_model(self, row: int) -> CameraModel | None:
         """Return the model of a fisheye lens, or None for a pinhole."""
         number = int(self.model[row])

@@ -23,9 +23,15 @@ from orbslam2py.settings.writer import format_settings, lens_lines, matrix_lines
 
 _log = logging.getLogger(__name__)
 _OF_CAMERA = re.compile(r"^Camera(?P<number>\d+)\.(?P<key>[\w.]+)\s*:")
+_MOUNT = re.compile(r"^Camera\d+\.T_c1_c\d+\s*:")
 #: Keys of `Camera.*` that all cameras have in common.
 _COMMON = ("fps", "RGB", "bf")
 _OWN = re.compile(r"\bCamera\.(?!(?:" + "|".join(_COMMON) + r")\b)")
+
+
+def is_rig_text(text: str) -> bool:
+    """Return whether a settings file tells how cameras of a rig are mounted."""
+    return any(_MOUNT.match(line) for line in text.splitlines())
 
 
 def read_rig_groups(
@@ -98,7 +104,7 @@ def _groups_of_camera(
         found = _OF_CAMERA.match(line)
         if found is not None:
             own = int(found["number"]) == number
-            skipping = not own or found["key"] == "depth" or found["key"].startswith("T_c1_c")
+            skipping = not own or found["key"] == "depth" or found["key"].startswith("T_")
         elif line[:1].strip() and not line.startswith("#"):
             skipping = False
         kept.append("" if skipping else re.sub(rf"^Camera{number}\.", "Camera.", line))
