@@ -28,8 +28,8 @@ constexpr double kLeastSine = 0.1;
 constexpr double kLeastDisparity = 0.01;  // pixels
 /// Least parallax that the affine map of a patch is computed for [rad]: beyond, depth is infinite.
 constexpr double kLeastParallax = 1e-4;
-/// Half the side of the 9 x 9 pixels that are aligned [px of their level].
-constexpr double kHalfPatch = 4.5;
+/// Half the side of the square of 9 x 9 pixels whose alignment counts [px of their level].
+constexpr double kHalfPatch = 4;
 /// Cosine of the angle between the axes of two cameras that bend patches alike.
 constexpr double kSameDirection = 0.97;
 constexpr std::size_t kKeypointsPerTask = 64;  // keypoints per task

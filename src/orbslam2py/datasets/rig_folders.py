@@ -97,9 +97,13 @@ class RigFolders(UnlistedSequence):
             depths_of(named, self._moments, i) if member.depth else {}
             for i, ((named, _), member) in enumerate(zip(cameras, rig, strict=True))
         ]
-        self._paths = [next(path for path in moment if path is not None) for moment in self._moments]
+        self._paths = [
+            next(path for path in moment if path is not None) for moment in self._moments
+        ]
         told = self._choose_times([Path(name) for name in names], times)
-        _log.info("%s: %d moments of %d cameras; their times %s", folder, len(names), len(rig), told)
+        _log.info(
+            "%s: %d moments of %d cameras; their times %s", folder, len(names), len(rig), told
+        )
 
     def load(self, index: int, /) -> Images:
         """Read the images of a moment; None for a camera that has none."""
@@ -148,9 +152,7 @@ def camera_folders(folder: Path) -> list[tuple[Path, Path]]:
     return [(path, path / "data" if (path / "data").is_dir() else path) for path in paths]
 
 
-def depths_of(
-    camera: Path, moments: list[list[Path | None]], number: int
-) -> Mapping[str, Path]:
+def depths_of(camera: Path, moments: list[list[Path | None]], number: int) -> Mapping[str, Path]:
     """Find the depth images of a camera, by the names of its images."""
     named = _NUMBER.match(camera.name)
     assert named is not None

@@ -152,7 +152,7 @@ def tables_of(version: int) -> dict[str, Table]:
     """The tables of a version of the format."""
     older: dict[str, Table] = {}
     if version < 5:
-        later = RIG_MOUNT
+        later: tuple[str, ...] = RIG_MOUNT
         later += FISHEYE_LENS if version < 4 else ()
         later += RATIONAL_LENS if version < 3 else ()
         cameras = TABLES["cameras"]

@@ -17,8 +17,8 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.extrinsics import checked_extrinsics, inverse_of
 from orbslam2py.settings.camera_model import CameraModel
+from orbslam2py.settings.extrinsics import checked_extrinsics, inverse_of
 from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,

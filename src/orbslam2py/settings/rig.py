@@ -60,9 +60,7 @@ class RigCamera(EqualByValue, MadeAgainByCopies):
 
     def __post_init__(self) -> None:
         if not isinstance(self.camera, CameraSettings):
-            raise SettingsError(
-                f"a camera of the rig is {shown(self.camera)}; give CameraSettings"
-            )
+            raise SettingsError(f"a camera of the rig is {shown(self.camera)}; give CameraSettings")
         if self.camera.width is None or self.camera.height is None:
             raise SettingsError(
                 "the size of the images of a camera of the rig is missing; give width and height "

@@ -16,8 +16,8 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.settings.groups import DISTORTION_FIELDS, CameraSettings, DepthSettings
 from orbslam2py.settings.opencv_yaml import Document, Problem, read_matrix, read_number, scan
 from orbslam2py.settings.reader import groups_of_text, read_text
-from orbslam2py.settings.right_camera import SettingsGroups
 from orbslam2py.settings.rig import USUAL_CLOSE_FACTOR, RigCamera
+from orbslam2py.settings.right_camera import SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings, lens_lines, matrix_lines
 
@@ -141,8 +141,7 @@ def _camera_of(document: Document, number: int, camera: CameraSettings, path: Pa
             line = document.entries[wrong[0]].line if wrong else None
             raise SettingsError(
                 f"{name} is missing: 4 x 4 numbers that map coordinates of camera {number} into "
-                "those of camera 1, metres"
-                + (f"; {wrong[0]} is no such key" if wrong else "")
+                "those of camera 1, metres" + (f"; {wrong[0]} is no such key" if wrong else "")
             )
         if name in document.entries:
             line = document.entries[name].line

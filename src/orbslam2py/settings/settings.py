@@ -34,7 +34,6 @@ from orbslam2py.settings.groups import (
     raise_if_any,
 )
 from orbslam2py.settings.reader import groups_of_text, read_groups
-from orbslam2py.settings.right_camera import RightCamera, SettingsGroups
 from orbslam2py.settings.rig import (
     USUAL_CLOSE_FACTOR,
     VIRTUAL_BASELINE,
@@ -45,6 +44,7 @@ from orbslam2py.settings.rig import (
     doubts_of_rig,
 )
 from orbslam2py.settings.rig_file import format_rig, read_rig_groups, rig_of_text
+from orbslam2py.settings.right_camera import RightCamera, SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
 
@@ -165,9 +165,9 @@ class Settings:
             )
         rig = checked_rig(self.rig)
         object.__setattr__(self, "rig", rig)
-        if self.depth is None:
-            object.__setattr__(self, "depth", DepthSettings(USUAL_CLOSE_FACTOR))
-        if any(camera.depth for camera in rig) and self.depth.raw_per_metre is None:
+        depth = self.depth or DepthSettings(USUAL_CLOSE_FACTOR)
+        object.__setattr__(self, "depth", depth)
+        if any(camera.depth for camera in rig) and depth.raw_per_metre is None:
             raise SettingsError(
                 "DepthMapFactor (depth.raw_per_metre) is missing; depth images need it: 1000 for "
                 "millimetres, 5000 for TUM, 1 for metres"

@@ -97,9 +97,7 @@ class RigCheck:
 
     def _inverse_pair(self, i: int, partner: int) -> core.WidePair:
         """Both cameras, if every extrinsic transform were given the wrong way round."""
-        first, second = (
-            inverse_of(np.asarray(self._rig[k].T_body_camera)) for k in (i, partner)
-        )
+        first, second = (inverse_of(np.asarray(self._rig[k].T_body_camera)) for k in (i, partner))
         T = inverse_of(first) @ second
         member = self._rig[i]
         camera = core.Camera(

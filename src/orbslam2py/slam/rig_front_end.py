@@ -116,7 +116,9 @@ class RigFrontEnd(FrontEnd):
         pixels, depths = self._taken(images, timestamp)
         allowed = [None] * len(pixels) if masks is None else list(masks)
         if len(allowed) != len(pixels):
-            raise ImageError(f"a rig of {len(pixels)} cameras has {len(allowed)} masks; give one each")
+            raise ImageError(
+                f"a rig of {len(pixels)} cameras has {len(allowed)} masks; give one each"
+            )
         for i, (image, mask) in enumerate(zip(pixels, allowed, strict=True), 1):
             if image is not None:
                 check_mask(mask, image, f"mask {i}")
@@ -205,9 +207,7 @@ class RigFrontEnd(FrontEnd):
             raise ImageError(f"the frame of {timestamp} s has no image of any camera")
         return pixels, depths
 
-    def _image_of(
-        self, i: int, given: Any, member: RigCamera
-    ) -> tuple[ByteArray | None, Any]:
+    def _image_of(self, i: int, given: Any, member: RigCamera) -> tuple[ByteArray | None, Any]:
         if given is None:
             return None, None
         image, depth = given, None
@@ -257,5 +257,3 @@ def front_end_of(settings: Settings, **options: bool) -> FrontEnd:
     if settings.rig is not None:
         return RigFrontEnd(settings)
     return FrontEnd(settings, settings.sensor, **options)
-
-

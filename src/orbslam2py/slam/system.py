@@ -51,8 +51,8 @@ from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.inertial import ImuCheck
 from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pipeline import Pipeline
-from orbslam2py.slam.rig_front_end import RigFrontEnd
 from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
+from orbslam2py.slam.rig_front_end import RigFrontEnd
 from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)

@@ -227,7 +227,10 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
 
     def _images_of_rig(self, T_wc: FloatArray, index: int) -> Images:
         """Render the images of all cameras; only the first one can be covered."""
-        seconds, exposure = self._seconds_on_way(index), self._exposure(float(self.timestamps[index]))
+        seconds, exposure = (
+            self._seconds_on_way(index),
+            self._exposure(float(self.timestamps[index])),
+        )
         factor = self.default_settings().depth_factor
         cameras: list[Any] = []
         for k, (member, view) in enumerate(zip(self._rig, self._wide_views, strict=True)):

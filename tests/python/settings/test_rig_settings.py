@@ -12,7 +12,15 @@ import pytest
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import RigCamera, Sensor, Settings
 from orbslam2py.settings.rig import depth_sources
-from support.rigs import PINHOLE, WIDE, back_to_back, four_around, mounted, rig_settings, two_wide_pairs
+from support.rigs import (
+    PINHOLE,
+    WIDE,
+    back_to_back,
+    four_around,
+    mounted,
+    rig_settings,
+    two_wide_pairs,
+)
 
 
 @pytest.mark.parametrize("settings", [back_to_back(), two_wide_pairs(), four_around()])
@@ -51,9 +59,7 @@ def written(tmp_path: Path, old: str, new: str) -> Path:
         ("KannalaBrandt8", "KannalaBrandt9", "Camera1.type"),
     ],
 )
-def test_errors_name_the_key_of_the_camera(
-    tmp_path: Path, old: str, new: str, named: str
-) -> None:
+def test_errors_name_the_key_of_the_camera(tmp_path: Path, old: str, new: str, named: str) -> None:
     with pytest.raises(SettingsError, match=named):
         Settings.load(written(tmp_path, old, new), Sensor.RIG)
 

@@ -13,15 +13,16 @@ import pytest
 import orbslam2py as orb
 from orbslam2py.errors import ImageError, StateError
 from orbslam2py.evaluation import evaluate_trajectory
-from orbslam2py.settings import DepthSettings, OrbSettings, RightCamera, Settings
+from orbslam2py.settings import DepthSettings, OrbSettings, RigCamera, RightCamera, Settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.rigs import WIDE, back_to_back, four_around, mounted, rig_settings, two_wide_pairs
-from orbslam2py.settings import RigCamera
 
 Pictures = tuple[Any, ...]
 
 
-def made_up(settings: Settings, frames: int, **options: Any) -> tuple[SyntheticSequence, list[Pictures]]:
+def made_up(
+    settings: Settings, frames: int, **options: Any
+) -> tuple[SyntheticSequence, list[Pictures]]:
     sequence = SyntheticSequence(
         SyntheticOptions(world="corridor", sensor="rig", rig=settings, frames=frames, **options)
     )

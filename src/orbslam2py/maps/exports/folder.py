@@ -14,7 +14,7 @@ import numpy as np
 from orbslam2py._arguments import path_of
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import atomic_folder, atomic_write, failing_as
-from orbslam2py.errors import MapFileError, DatasetError
+from orbslam2py.errors import DatasetError, MapFileError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.exports.colours import ColourSampler
 from orbslam2py.maps.exports.images import (
