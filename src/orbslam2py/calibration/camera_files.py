@@ -7,6 +7,7 @@ import logging
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 from orbslam2py._arguments import cannot_open, is_whole, member_of, path_of, shown
 from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile, ForeignCamera
@@ -122,10 +123,8 @@ def read_camera_file(
     if file.note:
         _log.info("%s: %s", path, file.note)
     if sensor is Sensor.RIG:
-        for given, option in ((right, "--right"), (camera, "--camera"), (baseline, "--baseline")):
-            if given is not None:
-                raise SettingsError(f"a rig has all cameras of the file; leave {option} out")
-        return _rig_of(path, file, fps, depth_factor, n_features)
+        not_of_rigs = {"--right": right, "--camera": camera, "--baseline": baseline}
+        return _rig_of(path, file, not_of_rigs, fps, depth_factor, n_features)
     if right is None:
         chosen = _choose(path, file, camera, sensor)
     else:
@@ -155,10 +154,14 @@ def read_camera_file(
 def _rig_of(
     path: Path,
     file: CameraFile,
+    not_of_rigs: dict[str, Any],
     fps: float | None,
     depth_factor: float | None,
     n_features: int | None,
 ) -> Settings:
+    for option, given in not_of_rigs.items():
+        if given is not None:
+            raise SettingsError(f"a rig has all cameras of the file; leave {option} out")
     settings = rig_settings(path, file, fps if fps is not None else file.fps or _RATE)
     n_features = file.n_features if n_features is None else n_features
     if n_features is not None:

@@ -140,8 +140,8 @@ Rig = Annotated[
     Path | None,
     typer.Option(
         metavar="SETTINGS",
-        help="Settings file of a rig (Camera1.*, Camera2.*, Camera2.T_c1_c2, ...): images of all its "
-        "cameras through their lenses. Then --sensor is rig.",
+        help="Settings file of a rig (Camera1.*, Camera2.*, Camera2.T_c1_c2, ...): images of all "
+        "its cameras through their lenses. Then --sensor is rig.",
     ),
 ]
 

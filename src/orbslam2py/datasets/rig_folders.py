@@ -100,7 +100,7 @@ class RigFolders(UnlistedSequence):
         self._paths = [
             next(path for path in moment if path is not None) for moment in self._moments
         ]
-        told = self._choose_times([Path(name) for name in names], times)
+        told = self._choose_times(self._paths, times)
         _log.info(
             "%s: %d moments of %d cameras; their times %s", folder, len(names), len(rig), told
         )
@@ -123,7 +123,7 @@ class RigFolders(UnlistedSequence):
         return Images(first[0] if isinstance(first, tuple) else first, cameras=tuple(cameras))
 
     def ground_truth(self) -> Trajectory | None:
-        """Read the true poses of the first camera in the layout of EuRoC; None if there are none."""
+        """Read the true poses of the first camera in EuRoC's layout; None if there are none."""
         return ground_truth_of(_root_of(self.folder))
 
     def _settings_folders(self) -> tuple[Path, ...]:
@@ -178,7 +178,7 @@ def _moments_of(
     complete = [name for name in names if all(name in one for one in series)]
     fewest = min(map(len, series))
     if len(complete) < 0.5 * fewest:
-        stamps = [stamps_of_names([Path(name) for name in one]) for one in series]
+        stamps = [stamps_of_names(list(one.values())) for one in series]
         if any(one is None for one in stamps):
             raise DatasetError(
                 f"the images in {folder} do not belong together: their names differ, and are no "

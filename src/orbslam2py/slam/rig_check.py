@@ -90,8 +90,8 @@ class RigCheck:
             )
         else:
             self.warning = (
-                f"{found}: look at the extrinsics (metres, from camera 2 to camera 1), at the order "
-                "of the cameras, and whether their images are of one moment"
+                f"{found}: look at the extrinsics (metres, from camera 2 to camera 1), at the "
+                "order of the cameras, and whether their images are of one moment"
             )
         _log.warning("%s", self.warning)
 

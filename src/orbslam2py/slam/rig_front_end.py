@@ -193,8 +193,8 @@ class RigFrontEnd(FrontEnd):
         if not isinstance(images, Sequence) or len(images) != n:
             given = len(images) if isinstance(images, Sequence) else 1
             raise ImageError(
-                f"the frame of {timestamp} s has {given} images; this rig has {n} cameras: give one "
-                "image for each, None for a camera that gave none"
+                f"the frame of {timestamp} s has {given} images; this rig has {n} cameras: give "
+                "one image for each, None for a camera that gave none"
             )
         pixels: list[ByteArray | None] = []
         depths: list[Any] = []

@@ -185,8 +185,8 @@ class SyntheticOptions:
     def _check_rig(self) -> None:
         if (self.sensor is Sensor.RIG) != (self.rig is not None):
             raise SettingsError(
-                "a rig needs the sensor rig and settings of its cameras (--rig FILE); give both, or "
-                "neither"
+                "a rig needs the sensor rig and settings of its cameras (--rig FILE); give both, "
+                "or neither"
             )
         if self.rig is None:
             return

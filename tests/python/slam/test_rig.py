@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,25 @@ def test_a_camera_that_drops_out_costs_its_points_alone(caplog: pytest.LogCaptur
     told = [text for text in caplog.messages if "has no image" in text]
     assert len(told) == 3  # once for each camera
     assert "camera 1 of the rig" in told[0]
+
+
+def test_a_bare_wall_before_the_front_pair_loses_the_pair_but_not_the_rig() -> None:
+    settings = two_wide_pairs()
+    assert settings.rig is not None
+    sequence, images = made_up(settings, 14)
+    wall = np.full((256, 256), 140, np.uint8)
+    lost = {}
+    for used in (2, 4):
+        rig = replace(settings, rig=settings.rig[:used])
+        slam = orb.System(rig, "rig", deterministic=True)
+        poses = []
+        for i, (cameras, timestamp) in enumerate(
+            zip(images, sequence.timestamps.tolist(), strict=True)
+        ):
+            given = cameras if i not in (8, 9, 10) else (wall, wall, *cameras[2:])
+            poses.append(slam.track(given[:used], timestamp).T_wc)
+        lost[used] = [i for i, T_wc in enumerate(poses) if T_wc is None]
+    assert lost == {2: [8, 9, 10], 4: []}
 
 
 def test_found_again_and_loaded_again(tmp_path: Path) -> None:
