@@ -21,7 +21,8 @@ from orbslam2py.datasets.images import read_depth
 from orbslam2py.datasets.time_files import stamps_of_names
 from orbslam2py.datasets.unlisted import UnlistedSequence
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings import Sensor
+from orbslam2py.settings import Sensor, Settings
+from orbslam2py.settings.rig_file import is_rig_text
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
 
 _log = logging.getLogger(__name__)
@@ -35,6 +36,18 @@ A_RIG = (
     "cam0, cam1, ... (or mav0/cam0/data, ...), and depth0, ... for cameras with depth images; the "
     "images of one moment have the same name, or times as names"
 )
+
+
+def is_rig(folder: Path, sensor: Sensor | str | None, settings: SettingsChoice) -> bool:
+    """Return whether a folder is to be read as one of a rig: by the sensor, or by the settings."""
+    if not folder.is_dir():
+        return False
+    if sensor is not None:
+        return Sensor(sensor) is Sensor.RIG
+    if isinstance(settings, Settings):
+        return settings.sensor is Sensor.RIG
+    file = folder / "settings.yaml" if settings is None else Path(settings)
+    return file.is_file() and is_rig_text(file.read_text("utf-8", errors="replace"))
 
 
 class RigFolders(UnlistedSequence):
@@ -92,7 +105,7 @@ class RigFolders(UnlistedSequence):
                 f"images ({has}); {A_RIG}"
             )
         series = [{path.stem: path for path in files_in_time(images)} for _, images in cameras]
-        self._moments, names = _moments_of(folder, series)
+        self._moments = _moments_of(folder, series)
         self._depths = [
             depths_of(named, self._moments, i) if member.depth else {}
             for i, ((named, _), member) in enumerate(zip(cameras, rig, strict=True))
@@ -102,7 +115,11 @@ class RigFolders(UnlistedSequence):
         ]
         told = self._choose_times(self._paths, times)
         _log.info(
-            "%s: %d moments of %d cameras; their times %s", folder, len(names), len(rig), told
+            "%s: %d moments of %d cameras; their times %s",
+            folder,
+            len(self._moments),
+            len(rig),
+            told,
         )
 
     def load(self, index: int, /) -> Images:
@@ -170,10 +187,8 @@ def depths_of(camera: Path, moments: list[list[Path | None]], number: int) -> Ma
     return files
 
 
-def _moments_of(
-    folder: Path, series: list[dict[str, Path]]
-) -> tuple[list[list[Path | None]], list[str]]:
-    """The image of every camera for each moment, and the names of the moments."""
+def _moments_of(folder: Path, series: list[dict[str, Path]]) -> list[list[Path | None]]:
+    """The image of every camera for each moment."""
     names = sorted(set().union(*series), key=natural_key)
     complete = [name for name in names if all(name in one for one in series)]
     fewest = min(map(len, series))
@@ -186,16 +201,15 @@ def _moments_of(
             )
         return _by_times(folder, series, [one for one in stamps if one is not None])
     _tell_incomplete(folder, len(names), len(names) - len(complete))
-    return [[one.get(name) for one in series] for name in names], names
+    return [[one.get(name) for one in series] for name in names]
 
 
 def _by_times(
     folder: Path, series: list[dict[str, Path]], stamps: list[Stamps]
-) -> tuple[list[list[Path | None]], list[str]]:
+) -> list[list[Path | None]]:
     """Join images whose times differ little, by those of the camera with most images."""
     leading = max(range(len(series)), key=lambda i: len(series[i]))
-    names = list(series[leading])
-    moments: list[list[Path | None]] = [[None] * len(series) for _ in names]
+    moments: list[list[Path | None]] = [[None] * len(series) for _ in series[leading]]
     most_apart = 0.0
     for i, (one, stamp) in enumerate(zip(series, stamps, strict=True)):
         first, second = associate(stamps[leading].seconds, stamp.seconds)
@@ -219,7 +233,7 @@ def _by_times(
             f"whose times differ by less than {MAX_DIFFERENCE} s; {A_RIG}"
         )
     _tell_incomplete(folder, len(moments), incomplete)
-    return moments, names
+    return moments
 
 
 def _tell_incomplete(folder: Path, n: int, incomplete: int) -> None:

@@ -160,8 +160,9 @@ class Settings:
             return
         if self.rig is None:
             raise SettingsError(
-                "a rig needs its cameras: rig=[RigCamera(...), ...], or a file with Camera1.*, "
-                "Camera2.*, ..."
+                "a rig needs its cameras: a file with Camera1.*, Camera2.*, ..., which "
+                "import-camera makes of a calibration of all cameras (--sensor rig), or "
+                "rig=[RigCamera(...), ...]"
             )
         rig = checked_rig(self.rig)
         object.__setattr__(self, "rig", rig)

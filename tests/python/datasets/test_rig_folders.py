@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import cv2
@@ -83,5 +82,5 @@ def test_refuses_folders_that_are_no_rig(tmp_path: Path) -> None:
         open_sequence(depths, "rig")
     (tmp_path / "empty").mkdir()
     two_wide_pairs().save(tmp_path / "empty" / "settings.yaml")
-    with pytest.raises(DatasetError, match="no images of a rig.*cam0, cam1"):
+    with pytest.raises(DatasetError, match=r"no images of a rig.*cam0, cam1"):
         open_sequence(tmp_path / "empty", "rig")
