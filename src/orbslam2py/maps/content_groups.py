@@ -44,6 +44,8 @@ class ArrayGroup:
             yield field.name, getattr(self, field.name)
 
 
+#: Numbers that `Cameras.mount` has of a camera.
+MOUNT_SIZE = 12
 #: Where `Cameras.lens` has the centre of the right camera of a fisheye pair.
 RIGHT_CENTRE = slice(13, 16)
 
@@ -76,10 +78,15 @@ class Cameras(ArrayGroup):
     lens: FloatArray
     """(c, 16) parameters of that model, zeros after the last one. The last three are the centre of
     the right camera of a fisheye pair in the frame of the left one [m], zeros if there is none."""
-    mount: FloatArray
+    mount: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((0, MOUNT_SIZE)))
     """(c, 12) of the cameras of rigs, which follow all others: the row of their rig, 1 if their
     keypoints are used, camera to body as quaternion x, y, z, w and translation [m], and the centre
-    of the camera that gives them depths [m]. Of other cameras and of rigs -1 and zeros."""
+    of the camera that gives them depths [m]. Of other cameras and of rigs -1 and zeros, which
+    an empty array becomes."""
+
+    def __post_init__(self) -> None:
+        if not len(self.mount):
+            object.__setattr__(self, "mount", no_mounts(len(self)))
 
     def __len__(self) -> int:
         return len(self.fx)
@@ -138,10 +145,6 @@ class Cameras(ArrayGroup):
         name, _, parameters = _core.camera_models()[number - 1]
         size = (int(self.width[row]), int(self.height[row]))
         return CameraModel(name, self.lens[row, : len(parameters)], size)
-
-
-#: Numbers that `Cameras.mount` has of a camera.
-MOUNT_SIZE = 12
 
 
 def no_mounts(n: int) -> FloatArray:

@@ -145,8 +145,8 @@ def test_what_is_no_map_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_newer_version_is_refused(tmp_path: Path) -> None:
-    path = edit(written(tmp_path), "PRAGMA user_version = 5")
-    _refused(path, "version 5", "update orbslam2py")
+    path = edit(written(tmp_path), "PRAGMA user_version = 6")
+    _refused(path, "version 6", "update orbslam2py")
 
 
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.7, 0.99])
