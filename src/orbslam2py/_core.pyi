@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InertialFilter', 'InertialKeyframes', 'InertialStart', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PairRectifier', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'PosePrior', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'Rectifier', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WidePair', 'WordVector', 'World', 'add_temporary_points', 'align_frame', 'align_keyframes', 'align_patch', 'align_right_columns', 'align_rotation', 'alignment_noise', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'build_wide_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_aligned', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'estimate_inertial_start', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_images', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'release_images', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'transform_map', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
+__all__: list[str] = ['AlignmentFailure', 'AlignmentNoise', 'AlignmentOptions', 'BundleOptions', 'BundleSummary', 'Camera', 'CameraModel', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InertialFilter', 'InertialKeyframes', 'InertialStart', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'PairRectifier', 'PatchAlignment', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'PosePrior', 'Preintegration', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'Rectifier', 'RigExtractor', 'ScalePyramid', 'Scoring', 'SettingsError', 'SightingAlignment', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WidePair', 'WordVector', 'World', 'add_temporary_points', 'align_frame', 'align_keyframes', 'align_patch', 'align_right_columns', 'align_rotation', 'alignment_noise', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'build_wide_stereo_frame', 'camera_models', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_aligned', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'estimate_inertial_start', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'join_frames', 'keep_images', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'release_images', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'transform_map', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -450,9 +450,23 @@ class Camera:
     right camera. Of a pinhole the plane is flat, without the distortion of the lens; of a
     fisheye lens it is the image itself. Pixels of the image are called raw.
     """
+    @staticmethod
+    def rig(cameras: collections.abc.Sequence[Camera], T_bc: collections.abc.Sequence[Pose], active: collections.abc.Sequence[bool]) -> Camera:
+        """
+        A rig of two to eight cameras; T_bc: each camera to body coordinates [m], active:
+        whether points are looked for in its image. Raises SettingsError.
+        """
     def __init__(self, options: CameraOptions) -> None:
         """
         Raises SettingsError when an option is out of range.
+        """
+    def camera_at(self, u: typing.SupportsFloat | typing.SupportsIndex) -> int:
+        """
+        Of a rig: the camera that column u of the plane belongs to; 0 otherwise.
+        """
+    def column_of(self, camera: typing.SupportsInt | typing.SupportsIndex) -> float:
+        """
+        Column of a rig's plane at which the column 0 of a camera lies.
         """
     def errors(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
@@ -480,6 +494,10 @@ class Camera:
     def to_image(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
         Raw pixels (n, 2) float64 of pixels (n, 2) of the plane.
+        """
+    def with_active(self, active: collections.abc.Sequence[bool]) -> Camera:
+        """
+        The same rig, where other cameras are active.
         """
     @property
     def baseline(self) -> float:
@@ -521,6 +539,16 @@ class Camera:
     def is_rectified(self) -> bool:
         """
         True when the lens does not distort.
+        """
+    @property
+    def is_rig(self) -> bool:
+        """
+        Several cameras.
+        """
+    @property
+    def n_cameras(self) -> int:
+        """
+        Of a rig; 1 otherwise.
         """
     @property
     def pinhole(self) -> Pinhole:
@@ -1042,6 +1070,16 @@ class PairExtractor:
     def extract(self, left: numpy.ndarray, right: numpy.ndarray, left_mask: typing.Any = None, right_mask: typing.Any = None) -> tuple[Extraction, Extraction]:
         """
         Extractions (left, right) of two grey images (h, w) uint8 of one size. A mask is None, or uint8 of the same shape with 0 where no keypoint may lie. Raises ImageError for anything else, StateError while another thread uses this object.
+        """
+class RigExtractor:
+    """
+    Extracts the images of a rig's cameras at the same time.
+    """
+    def __init__(self, options: OrbOptions, n_cameras: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def extract(self, images: collections.abc.Sequence[typing.Any], masks: collections.abc.Sequence[typing.Any]) -> list[Extraction]:
+        """
+        Extractions of grey images (h, w) uint8, in their order; None gives an empty one. A mask is None, or uint8 of the shape of its image with 0 where no keypoint may lie. One thread at a time.
         """
 class ImageRotation:
     """
@@ -3758,6 +3796,11 @@ def index_keyframe(index: KeyFrameIndex, map: Map, id: int) -> None:
 def insert_keyframe(map: Map, frame: TrackedFrame, create_points: bool, n_minimum: typing.SupportsInt | typing.SupportsIndex = 100) -> int:
     """
     Make a keyframe of a tracked frame, with points from its depths; its id.
+    """
+def join_frames(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, frames: collections.abc.Sequence[Frame]) -> Frame:
+    """
+    Frame of a rig from the frames of its cameras, in their order; None: that camera has none.
+    The camera of the context is the rig.
     """
 def keep_images(frame: Frame, left: Extraction, right: Extraction | None = None) -> None:
     """

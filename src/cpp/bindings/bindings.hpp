@@ -18,6 +18,7 @@ void bind_camera_model(pybind11::module_& module);
 void bind_inertial(pybind11::module_& module);
 void bind_frame(pybind11::module_& module);
 void bind_raw_pairs(pybind11::module_& module);
+void bind_rig(pybind11::module_& module);
 void bind_frame_evidence(pybind11::module_& module);
 void bind_map(pybind11::module_& module);
 void bind_places(pybind11::module_& module);

@@ -104,6 +104,18 @@ void bind_pinhole(py::module_& module) {
       .def_readonly("max_y", &ImageBounds::max_y);
 }
 
+Camera rig_of(const std::vector<std::shared_ptr<Camera>>& cameras, const std::vector<Pose>& T_bc,
+              const std::vector<bool>& active) {
+  if (T_bc.size() != cameras.size() || active.size() != cameras.size()) {
+    throw py::value_error("give as many poses and flags as cameras");
+  }
+  CameraOptions options;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    options.members.push_back({cameras[i], T_bc[i], active[i]});
+  }
+  return Camera(options);
+}
+
 // Pinhole and size lie flat in Python: options.fx, options.width.
 template <class Part, class Value>
 void flat_property(py::class_<CameraOptions>& options, const char* name, Part CameraOptions::*part,
@@ -132,8 +144,8 @@ void bind_camera_options(py::module_& module) {
                        const std::shared_ptr<CameraModel>& model,
                        const Eigen::Vector3d& right_centre) {
              const Distortion lens = distortion_of(distortion);
-             return CameraOptions{{fx, fy, cx, cy}, lens,  bf,          depth_ratio,
-                                  {width, height},  model, right_centre};
+             return CameraOptions{{fx, fy, cx, cy}, lens,  bf,           depth_ratio,
+                                  {width, height},  model, right_centre, {}};
            }),
            py::arg("fx") = 0.0, py::arg("fy") = 0.0, py::arg("cx") = 0.0, py::arg("cy") = 0.0,
            py::arg("width") = 0, py::arg("height") = 0,
@@ -175,6 +187,17 @@ void bind_camera(py::module_& module) {
       "fisheye lens it is the image itself. Pixels of the image are called raw.")
       .def(py::init<const CameraOptions&>(), py::arg("options"),
            "Raises SettingsError when an option is out of range.")
+      .def_static("rig", &rig_of, py::arg("cameras"), py::arg("T_bc"), py::arg("active"),
+                  "A rig of two to eight cameras; T_bc: each camera to body coordinates [m], "
+                  "active:\nwhether points are looked for in its image. Raises SettingsError.")
+      .def("with_active", &Camera::with_active, py::arg("active"),
+           "The same rig, where other cameras are active.")
+      .def_property_readonly("is_rig", &Camera::is_rig, "Several cameras.")
+      .def_property_readonly("n_cameras", &Camera::n_cameras, "Of a rig; 1 otherwise.")
+      .def("camera_at", &Camera::camera_at, py::arg("u"),
+           "Of a rig: the camera that column u of the plane belongs to; 0 otherwise.")
+      .def("column_of", &Camera::column_of, py::arg("camera"),
+           "Column of a rig's plane at which the column 0 of a camera lies.")
       .def_property_readonly("pinhole", &Camera::pinhole)
       .def_property_readonly("bounds", &Camera::bounds)
       .def_property_readonly(
@@ -193,7 +216,7 @@ void bind_camera(py::module_& module) {
                              "The camera is the left one of a fisheye pair.")
       .def_property_readonly("bf", &Camera::bf, "Baseline times fx [px m].")
       .def_property_readonly("baseline", &Camera::baseline, "Metres.")
-      .def_property_readonly("close_depth", &Camera::close_depth,
+      .def_property_readonly("close_depth", [](const Camera& camera) { return camera.close_depth(); },
                              "Depths below this [m] are trusted from one view; inf without a "
                              "baseline.")
       .def("right_column", &Camera::right_column, py::arg("u"), py::arg("z"),

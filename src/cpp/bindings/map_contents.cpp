@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "base/errors.hpp"
 #include "base/parallel.hpp"
@@ -69,7 +72,60 @@ std::shared_ptr<const CameraModel> model_of(std::int64_t number, const StoredLen
       size);
 }
 
-void put_cameras(py::dict& arrays, const std::vector<CameraContents>& cameras) {
+// Of a camera of a rig: the row of the rig, whether it is active, T_bc as quaternion x, y, z, w and
+// translation, and CameraOptions::right_centre. Cameras of no rig have -1 and zeros.
+using StoredMount = std::array<double, 12>;
+
+struct Mounted {
+  CameraContents contents;
+  StoredMount mount{};
+};
+
+/// The cameras, followed by those of the rigs among them.
+std::vector<Mounted> with_members(const std::vector<CameraContents>& cameras) {
+  std::vector<Mounted> all;
+  for (const CameraContents& camera : cameras) {
+    all.push_back({camera, {}});
+    all.back().mount[0] = -1;
+  }
+  for (std::size_t rig = 0; rig < cameras.size(); ++rig) {
+    for (const RigMember& member : cameras[rig].camera.members) {
+      const auto& [q, t] = std::pair(member.T_bc.rotation(), member.T_bc.translation());
+      const Eigen::Vector3d& c = member.camera->options().right_centre;
+      CameraContents contents = cameras[rig];
+      contents.camera = member.camera->options();
+      all.push_back({contents,
+                     {static_cast<double>(rig), member.active ? 1.0 : 0.0, q.x(), q.y(), q.z(),
+                      q.w(), t.x(), t.y(), t.z(), c.x(), c.y(), c.z()}});
+    }
+  }
+  return all;
+}
+
+RigMember member_of(const CameraOptions& own, const StoredMount& mount) {
+  CameraOptions options = own;
+  options.right_centre = {mount[9], mount[10], mount[11]};
+  const Eigen::Quaterniond q(mount[5], mount[2], mount[3], mount[4]);
+  if (!(std::abs(q.squaredNorm() - 1) < 1e-6)) {
+    throw MapFileError("the rotation of a camera of a rig is no rotation");
+  }
+  try {
+    return {std::make_shared<Camera>(options),
+            Pose::from_unit(q, {mount[6], mount[7], mount[8]}), mount[1] != 0};
+  } catch (const SettingsError& error) {
+    throw MapFileError(std::string("a camera of a rig is impossible: ") + error.what());
+  }
+}
+
+void put_cameras(py::dict& arrays, const std::vector<CameraContents>& without_members) {
+  const std::vector<Mounted> mounted = with_members(without_members);
+  std::vector<CameraContents> cameras;
+  std::vector<StoredMount> mounts;
+  for (const Mounted& one : mounted) {
+    cameras.push_back(one.contents);
+    mounts.push_back(one.mount);
+  }
+  arrays["cameras.mount"] = owned<double>(std::move(mounts), {12});
   const auto put = [&](const char* name, auto value_of) {
     using Item = decltype(value_of(cameras.front()));
     py::array_t<Item> array(static_cast<py::ssize_t>(cameras.size()));
@@ -271,6 +327,7 @@ void read_cameras(Arrays& arrays, StoredMap& stored) {
              height = arrays.column<std::int64_t>("cameras.height", n),
              levels = arrays.column<std::int64_t>("cameras.n_levels", n);
   const auto factor = arrays.column<float>("cameras.scale_factor", n);
+  const auto mount = arrays.column<StoredMount, double, 12>("cameras.mount", n);
   const auto small = [](std::int64_t value) {  // out of range stays out of range
     return static_cast<int>(std::clamp<std::int64_t>(value, -1, 1 << 20));
   };
@@ -284,6 +341,17 @@ void read_cameras(Arrays& arrays, StoredMap& stored) {
     camera.model = model_of(model[i], lens[i], camera.image_size);
     if (camera.model && camera.model->parameters().size() <= kStoredCentre) {
       std::copy_n(lens[i].begin() + kStoredCentre, 3, camera.right_centre.data());
+    }
+    if (mount[i][0] >= 0) {
+      if (!(mount[i][0] < static_cast<double>(stored.cameras.size()))) {
+        throw MapFileError("a camera belongs to a rig that is missing");
+      }
+      auto& rig = stored.cameras[static_cast<std::size_t>(mount[i][0])].camera;
+      rig.members.push_back(member_of(camera, mount[i]));
+      continue;
+    }
+    if (i > stored.cameras.size()) {
+      throw MapFileError("the cameras of rigs must follow all others");
     }
     stored.cameras.push_back({camera, factor[i], small(levels[i])});
   }

@@ -14,6 +14,7 @@ PYBIND11_MODULE(_core, module) {
   bind_inertial(module);
   bind_raw_pairs(module);
   bind_frame(module);
+  bind_rig(module);
   bind_frame_evidence(module);
   bind_map(module);
   bind_places(module);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/errors.hpp"
+#include "camera/rig_plane.hpp"
 
 namespace orbslam {
 namespace {
@@ -95,6 +96,7 @@ Pinhole pinhole_of(const CameraModel& model) {
 }
 
 CameraOptions checked(const CameraOptions& options) {
+  if (!options.members.empty()) return checked_rig(options);
   CameraOptions full = options;
   if (options.model) {
     const ImageSize own = options.model->image_size();
@@ -115,19 +117,20 @@ CameraOptions checked(const CameraOptions& options) {
 /// The sight of a keypoint of a fisheye pair: its pixel rows are turned to the epipolar direction,
 /// and all of it is scaled so that bf over the third row is the disparity. Along the baseline,
 /// where a pair sees no depth, it stays as it is.
-Sight turned_to_pair(const Sight& B, const CameraOptions& options) {
+Eigen::Matrix3d turned_to_pair(const Eigen::Matrix3d& B, const CameraOptions& options) {
   const Eigen::Vector2d shift = B.topRows<2>() * options.right_centre;
   const double per_inverse_depth = shift.norm();
   if (!(per_inverse_depth > Camera::kLeastShift * options.bf)) return B;
   const Eigen::Vector2d along = shift / per_inverse_depth;
   Eigen::Matrix2d turn;
   turn << along.x(), along.y(), -along.y(), along.x();
-  Sight turned = B;
+  Eigen::Matrix3d turned = B;
   turned.topRows<2>() = turn * Eigen::Matrix<double, 2, 3>(B.topRows<2>());
   return turned * (options.bf / per_inverse_depth);
 }
 
 LensModel lens_of(const CameraOptions& options) {
+  if (!options.members.empty()) return lens_models::PinholeLens{options.pinhole};
   if (options.model) return options.model->lens();
   std::array<double, 12> coefficients{};
   std::copy(options.distortion.begin(), options.distortion.end(), coefficients.begin());
@@ -142,15 +145,24 @@ LensModel lens_of(const CameraOptions& options) {
 Camera::Camera(const CameraOptions& options)
     : options_(checked(options)),
       lens_(lens_of(options_)),
+      slots_(slots_of(options_)),
+      rig_(!slots_.empty()),
       // Any camera of a fisheye pair keeps its image as it is.
-      flat_(orbslam::is_flat(lens_) && options_.right_centre.isZero()),
-      distorts_(flat_ && std::holds_alternative<lens_models::PlaneDistortionLens>(lens_)),
+      flat_(!rig_ && orbslam::is_flat(lens_) && options_.right_centre.isZero()),
+      distorts_(rig_ ? any_distorts(options_.members)
+                     : flat_ && std::holds_alternative<lens_models::PlaneDistortionLens>(lens_)),
       wide_pair_(!options_.right_centre.isZero()),
-      bounds_(bounds_of(*this)) {
-  if (has_baseline()) close_depth_ = options_.bf * options_.depth_ratio / options_.pinhole.fx;
+      bounds_(rig_ ? bounds_of_rig(options_) : bounds_of(*this)) {
+  if (rig_) {
+    close_depth_ = deepest_close(options_.members);
+  } else if (has_baseline()) close_depth_ = options_.bf * options_.depth_ratio / options_.pinhole.fx;
 }
 
 bool Camera::project_wide(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const {
+  if (rig_) {
+    Eigen::Vector3d in_camera;
+    return looking_at(p_c, in_camera, uv) != nullptr;
+  }
   Seen seen;
   if (!std::visit([&](const auto& lens) { return lens.project(p_c, seen); }, lens_)) return false;
   if (!seen.uv.allFinite()) return false;
@@ -159,6 +171,10 @@ bool Camera::project_wide(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const
 }
 
 Eigen::Vector3d Camera::wide_ray(double u, double v) const {
+  if (rig_) {
+    const Slot& at = slot(u);
+    return at.R_bc * at.camera->ray(u - at.column, v).normalized();
+  }
   Eigen::Vector3d ray;
   const bool shown = std::visit(
       [&](const auto& lens) {
@@ -184,8 +200,17 @@ Eigen::Matrix2d Camera::raw_by_plane(double u, double v) const {
 }
 
 Sight Camera::sight(double u, double v) const {
+  if (rig_) return sight_of_rig(u, v);
+  const Eigen::Matrix3d B = sight_of_one(u, v);
+  Sight sight;
+  sight.leftCols<3>() = B;
+  sight.col(3).setZero();
+  return sight;
+}
+
+Eigen::Matrix3d Camera::sight_of_one(double u, double v) const {
   const Pinhole& k = pinhole();
-  Sight B;
+  Eigen::Matrix3d B;
   if (flat_) {
     B << k.fx, 0, k.cx - u, 0, k.fy, k.cy - v, 0, 0, 1;
     if (distorts_)
@@ -196,7 +221,7 @@ Sight Camera::sight(double u, double v) const {
   Seen seen;
   const bool shown = ray.allFinite() &&
                      std::visit([&](const auto& lens) { return lens.project(ray, seen); }, lens_);
-  if (!shown) return Sight::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (!shown) return Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
   B.topRows<2>() = seen.J;
   B.row(2) = ray.transpose();
   return wide_pair_ ? turned_to_pair(B, options_) : B;
@@ -210,6 +235,11 @@ double Camera::along_curve_of_pair(const Eigen::Vector2d& error, double u, doubl
 }
 
 double Camera::disparity(const Eigen::Vector3d& p_c) const {
+  if (rig_) {
+    Eigen::Vector2d uv;
+    double shift = 0;
+    return project(p_c, uv, shift) ? shift : std::numeric_limits<double>::quiet_NaN();
+  }
   if (flat_) return options_.bf / p_c.z();
   if (!wide_pair_) return options_.bf / p_c.norm();
   Seen seen;
@@ -218,22 +248,38 @@ double Camera::disparity(const Eigen::Vector3d& p_c) const {
 }
 
 double Camera::disparity(double u, double v, double depth) const {
-  return flat_ ? options_.bf / depth : options_.bf / sight(u, v).row(2).norm() / depth;
+  if (rig_) return slot(u).camera->disparity(u - slot(u).column, v, depth);
+  return flat_ ? options_.bf / depth : options_.bf / sight_of_one(u, v).row(2).norm() / depth;
 }
 
 double Camera::depth_of_axial(double u, double v, double z) const {
   if (flat_) return z;
+  if (rig_) return slot(u).camera->depth_of_axial(u - slot(u).column, v, z);
   const double along_axis = wide_ray(u, v).z();
   return along_axis > kLeastAxial ? z / along_axis : 0;
 }
 
 bool Camera::project(const Eigen::Vector3d& p_c, Seen& seen) const {
+  if (rig_) {
+    Eigen::Vector3d in_camera;
+    Eigen::Vector2d uv;
+    const Slot* at = looking_at(p_c, in_camera, uv);
+    if (at == nullptr || !at->camera->project(in_camera, seen)) return false;
+    seen.uv = uv;
+    seen.J = Eigen::Matrix<double, 2, 3>(seen.J * at->R_cb);
+    return true;
+  }
   if (!flat_) return std::visit([&](const auto& lens) { return lens.project(p_c, seen); }, lens_);
   return lens_models::PinholeLens{pinhole()}.project(p_c, seen);
 }
 
 Eigen::Vector2f Camera::from_image(const Eigen::Vector2f& raw) const {
   if (!distorts_) return raw;
+  if (rig_) {
+    const Slot& at = slot(raw.x());
+    const Eigen::Vector2f column(static_cast<float>(at.column), 0);
+    return at.camera->from_image(raw - column) + column;
+  }
   const auto& lens = std::get<lens_models::PlaneDistortionLens>(lens_);
   Eigen::Vector2d straight;
   if (!lens.distortion.undistort(pinhole().to_plane(raw.cast<double>()), straight)) return raw;
@@ -241,12 +287,17 @@ Eigen::Vector2f Camera::from_image(const Eigen::Vector2f& raw) const {
 }
 
 bool Camera::shows(const Eigen::Vector2d& raw) const {
+  if (rig_) return slot(raw.x()).camera->shows({raw.x() - slot(raw.x()).column, raw.y()});
   Eigen::Vector3d ray;
   return std::visit([&](const auto& lens) { return lens.unproject(raw, ray); }, lens_);
 }
 
 Eigen::Vector2d Camera::to_image(const Eigen::Vector2d& uv) const {
   if (!distorts_) return uv;
+  if (rig_) {
+    const Eigen::Vector2d column(slot(uv.x()).column, 0);
+    return slot(uv.x()).camera->to_image(uv - column) + column;
+  }
   const auto& lens = std::get<lens_models::PlaneDistortionLens>(lens_);
   Bent bent;
   if (!lens.distortion.distort(pinhole().to_plane(uv), bent)) {

@@ -50,11 +50,16 @@ struct Frame {
   bool has_depth(std::size_t i) const { return depth[i] > 0.0F; }
   /// The depth can be trusted from one view: see docs/method/frame.md#close-and-far-points.
   bool is_close(std::size_t i) const {
-    return depth[i] > 0.0F && depth[i] < static_cast<float>(camera->close_depth());
+    return depth[i] > 0.0F && depth[i] < static_cast<float>(camera->close_depth(keypoints[i].x));
   }
   /// Keypoint i at its measured depth in the camera frame; depth must be known.
   Eigen::Vector3d unproject(std::size_t i) const {
     return camera->unproject(keypoints[i].x, keypoints[i].y, depth[i]);
+  }
+  /// Where the camera that shows keypoint i is in the world, at a pose of the frame.
+  Eigen::Vector3d center_of(std::size_t i, const Pose& T_cw) const {
+    if (!camera->is_rig()) return T_cw.center();
+    return T_cw.rotation().conjugate() * (camera->centre(keypoints[i].x) - T_cw.translation());
   }
 };
 

@@ -49,15 +49,16 @@ struct Residuals {
   void add(const TrackedFrame& tracked, std::size_t i, std::size_t cell, const Eigen::Vector3d& p,
            const AlignedPixel& seen, const Sight& sight) {
     const Frame& frame = *tracked.frame;
-    const Eigen::Vector3d q = sight * p;
+    const Eigen::Vector3d q = apply(sight, p);
     const Eigen::Vector2d error = q.head<2>() / q.z();
     Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
-    by_point.topRows<2>() = (sight.topRows<2>() - error * sight.row(2)) / q.z();
+    const Eigen::Matrix3d B = sight.leftCols<3>();
+    by_point.topRows<2>() = (B.topRows<2>() - error * B.row(2)) / q.z();
     Eigen::Vector3d r(-error.x(), -error.y(), 0);
     const bool has_depth = frame.has_depth(i);
     if (has_depth) {
       const double bf = frame.camera->bf();
-      by_point.row(2) = by_point.row(0) + bf / (q.z() * q.z()) * sight.row(2);
+      by_point.row(2) = by_point.row(0) + bf / (q.z() * q.z()) * B.row(2);
       r.z() = -(error.x() + (seen.u - seen.right_u) - bf / q.z());
     }
     if (!r.allFinite()) return;
@@ -116,7 +117,7 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
     const AlignedPixel seen = sighting_of(tracked, i);
     const Sight sight = camera.sight(seen.u, seen.v);
-    const double depth = sight.row(2).dot(p);
+    const double depth = apply(sight, p).z();
     if (!(depth > 0)) continue;
     octaves.set(
         static_cast<std::size_t>(std::clamp(std::ilogb(depth) + kOctaves / 2, 0, kOctaves - 1)));

@@ -14,11 +14,11 @@ void nearest_keypoints(const Frame& frame, std::size_t n_minimum,
   std::sort(indices.begin(), indices.end(), [&](std::uint32_t a, std::uint32_t b) {
     return frame.depth[a] != frame.depth[b] ? frame.depth[a] < frame.depth[b] : a < b;
   });
-  const double close_depth = frame.camera->close_depth();
   // The first far one beyond the minimum is still taken: the original makes the point before it
   // asks whether there are enough, and its maps are to be comparable.
   for (std::size_t n = n_minimum; n < indices.size(); ++n) {
-    if (frame.depth[indices[n]] > close_depth) {
+    const std::uint32_t i = indices[n];
+    if (frame.depth[i] > frame.camera->close_depth(frame.keypoints[i].x)) {
       indices.resize(n + 1);
       return;
     }

@@ -28,6 +28,10 @@ constexpr double kLeastSine = 0.1;
 constexpr double kLeastDisparity = 0.01;  // pixels
 /// Least parallax that the affine map of a patch is computed for [rad]: beyond, depth is infinite.
 constexpr double kLeastParallax = 1e-4;
+/// Half the side of the square of 9 x 9 pixels whose alignment counts [px of their level].
+constexpr double kHalfPatch = 4;
+/// Cosine of the angle between the axes of two cameras that bend patches alike.
+constexpr double kSameDirection = 0.97;
 constexpr std::size_t kKeypointsPerTask = 64;  // keypoints per task
 
 double wrapped(double angle) { return std::remainder(angle, 2 * kHalfTurn); }
@@ -181,9 +185,9 @@ class WidePair::Search {
     const PatchAlignment aligned = align_patch(patch, A, right_.pyramid.levels[to],
                                                in_level(right_places_[to], {right.x, right.y}));
     if (!aligned.ok()) return std::nullopt;
-    const Eigen::Vector2d pixel(
-        right_places_[to].x.to_image(static_cast<float>(aligned.position.x())),
-        right_places_[to].y.to_image(static_cast<float>(aligned.position.y())));
+    Eigen::Vector2d pixel(right_places_[to].x.to_image(static_cast<float>(aligned.position.x())),
+                          right_places_[to].y.to_image(static_cast<float>(aligned.position.y())));
+    pixel -= bend_of_patch(left_pixel, level_scale(left_places_[from]), depth, seen.uv, warp);
     const auto found = right_direction(pixel);
     if (!found) return std::nullopt;
     const double beside = std::abs(wrapped(found->plane - at.plane)) * found->sine * found->across;
@@ -191,6 +195,27 @@ class WidePair::Search {
       return std::nullopt;
     }
     return found->angle;
+  }
+
+  /// Mean distance of the right patch from its affine map: lenses bend it, and cameras that look in
+  /// different directions differently. In the right image [px].
+  Eigen::Vector2d bend_of_patch(const Eigen::Vector2d& left_pixel, const Eigen::Vector2d& scale,
+                                double depth, const Eigen::Vector2d& right_pixel,
+                                const Eigen::Matrix2d& warp) const {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    if (pair_.R_rl_(2, 2) > kSameDirection) return sum;
+    // Of a quadratic function over a square of side 2 h, four points at h sqrt(2/3) give the mean.
+    const double aside = kHalfPatch * std::sqrt(2.0 / 3.0);
+    for (const Eigen::Vector2d& side : {Eigen::Vector2d(aside, 0), Eigen::Vector2d(-aside, 0),
+                                        Eigen::Vector2d(0, aside), Eigen::Vector2d(0, -aside)}) {
+      const Eigen::Vector2d offset = side.cwiseProduct(scale);
+      const Eigen::Vector2d at = left_pixel + offset;
+      const Eigen::Vector3d point = depth * pair_.left_->ray(at.x(), at.y());
+      Seen seen;
+      if (!point.allFinite() || !pair_.right_.project(pair_.T_rl_ * point, seen)) return {0, 0};
+      sum += seen.uv - right_pixel - warp * offset;
+    }
+    return sum / 4;
   }
 
   const WidePair& pair_;

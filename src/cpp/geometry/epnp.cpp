@@ -72,7 +72,7 @@ Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pix
                                             const Camera& camera) {
   Eigen::Matrix<double, 12, 12> normal = Eigen::Matrix<double, 12, 12>::Zero();
   for (Eigen::Index i = 0; i < pixels.cols(); ++i) {
-    const Eigen::Matrix<double, 2, 3> rows = camera.sight(pixels(0, i), pixels(1, i)).topRows<2>();
+    const Eigen::Matrix<double, 2, 3> rows = camera.sight(pixels(0, i), pixels(1, i)).topLeftCorner<2, 3>();
     const Eigen::Matrix3d product = rows.transpose() * rows;
     for (int a = 0; a < 4; ++a) {
       for (int b = 0; b <= a; ++b) {
@@ -209,7 +209,7 @@ double mean_error(const Pose& T_cw, const Points& points, const Pixels& pixels,
   double sum = 0;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Vector3d p_c = R * points.col(i) + T_cw.translation();
-    const Eigen::Vector3d q = camera.sight(pixels(0, i), pixels(1, i)) * p_c;
+    const Eigen::Vector3d q = apply(camera.sight(pixels(0, i), pixels(1, i)), p_c);
     // Of a fisheye lens what lies behind the ray has an image of its own.
     if (!camera.is_flat() && !(q.z() > 0)) return std::numeric_limits<double>::infinity();
     sum += q.head<2>().norm() / std::abs(q.z());
@@ -240,7 +240,7 @@ std::optional<EpnpPose> solve_epnp(const Points& points, const Pixels& pixels,
     for (int k = 0; k < 4; ++k) control += b[k] * basis[static_cast<std::size_t>(k)];
     Eigen::Matrix3Xd camera_points = control * frame->weights;
     if (!camera_points.allFinite()) continue;
-    const Eigen::RowVector3d front = camera.sight(pixels(0, 0), pixels(1, 0)).row(2);
+    const Eigen::RowVector3d front = camera.sight(pixels(0, 0), pixels(1, 0)).row(2).head<3>();
     if (front * camera_points.col(0) < 0) camera_points = -camera_points;
     const Pose T_cw = absolute_orientation(points, camera_points);
     const double error = mean_error(T_cw, points, pixels, camera);

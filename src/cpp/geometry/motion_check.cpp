@@ -22,7 +22,8 @@ struct CameraPair {
   }
 
   /// Linear triangulation of two keypoints, in units of their pixels.
-  Eigen::Vector3d triangulate(const Sight& sight_1, const Sight& sight_2) const {
+  Eigen::Vector3d triangulate(const Eigen::Matrix3d& sight_1,
+                              const Eigen::Matrix3d& sight_2) const {
     Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
     A.topLeftCorner<2, 3>() = sight_1.topRows<2>();
     A.bottomRows<2>() = sight_2.topRows<2>() * P;
@@ -47,8 +48,8 @@ struct Judgement {
   double parallax_cosine = 0;
 };
 
-Judgement judge(const CameraPair& cameras, const Sight& sight_1, const Sight& sight_2,
-                double max_squared_error) {
+Judgement judge(const CameraPair& cameras, const Eigen::Matrix3d& sight_1,
+                const Eigen::Matrix3d& sight_2, double max_squared_error) {
   Judgement judgement;
   const Eigen::Vector3d p_1 = cameras.triangulate(sight_1, sight_2);
   if (!p_1.allFinite()) return judgement;
@@ -89,8 +90,8 @@ MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (!inliers[i]) continue;
     const auto k = static_cast<Eigen::Index>(i);
-    const Judgement judgement = judge(cameras, camera.sight(pairs.u_1[k], pairs.v_1[k]),
-                                      camera.sight(pairs.u_2[k], pairs.v_2[k]), max_squared_error);
+    const Judgement judgement = judge(cameras, camera.sight(pairs.u_1[k], pairs.v_1[k]).leftCols<3>(),
+                                      camera.sight(pairs.u_2[k], pairs.v_2[k]).leftCols<3>(), max_squared_error);
     if (!judgement.good) continue;
     support.points[i] = judgement.point;
     support.good[i] = 1;

@@ -34,6 +34,18 @@ PnpRansac::PnpRansac(PnpProblem problem, const PnpOptions& options, std::uint64_
   ransac.min_inliers = std::max({expected, ransac.min_inliers, sample_size});
   min_inliers_ = ransac.min_inliers;
   max_iterations_ = ransac_iterations(sampler_.count(), ransac);
+  if (!problem_.camera->is_rig()) return;
+  by_camera_.resize(problem_.camera->n_cameras());
+  for (Eigen::Index i = 0; i < problem_.pixels.cols(); ++i) {
+    by_camera_[problem_.camera->camera_at(problem_.pixels(0, i))].push_back(
+        static_cast<std::size_t>(i));
+  }
+  std::size_t most = 0;
+  for (const auto& some : by_camera_) {
+    samplers_.emplace_back(some.size(), seed + samplers_.size() + 1);
+    most = std::max(most, some.size());
+  }
+  if (most < sample_size) max_iterations_ = 0;
 }
 
 PnpPose PnpRansac::judge(const Pose& T_cw) const {
@@ -53,34 +65,63 @@ PnpPose PnpRansac::judge(const Pose& T_cw) const {
   return pose;
 }
 
-std::optional<PnpPose> PnpRansac::pose_of_sample() {
-  const auto sample = sampler_.draw<sample_size>();
-  Eigen::Matrix<double, 3, sample_size> points;
-  Eigen::Matrix<double, 2, sample_size> pixels;
-  for (std::size_t i = 0; i < sample_size; ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    points.col(k) = problem_.points.col(sample[i]);
-    pixels.col(k) = problem_.pixels.col(sample[i]);
+std::vector<std::size_t> PnpRansac::draw_of_rig() {
+  const Camera& rig = *problem_.camera;
+  for (;;) {
+    const auto drawn = sampler_.draw<1>();
+    const std::size_t camera = rig.camera_at(problem_.pixels(0, drawn[0]));
+    if (by_camera_[camera].size() < sample_size) continue;
+    std::vector<std::size_t> sample;
+    for (const int i : samplers_[camera].draw<sample_size>()) {
+      sample.push_back(by_camera_[camera][static_cast<std::size_t>(i)]);
+    }
+    return sample;
   }
-  const auto estimate = solve_epnp(points, pixels, *problem_.camera);
-  if (!estimate) return std::nullopt;
-  return judge(estimate->T_cw);
+}
+
+std::optional<PnpPose> PnpRansac::pose_of(const std::vector<std::size_t>& chosen) const {
+  const Camera& rig = *problem_.camera;
+  const auto n = static_cast<Eigen::Index>(chosen.size());
+  const std::size_t camera = rig.camera_at(problem_.pixels(0, static_cast<Eigen::Index>(chosen[0])));
+  const Eigen::Vector2d corner(rig.column_of(camera), 0);
+  Eigen::Matrix3Xd points(3, n);
+  Eigen::Matrix2Xd pixels(2, n);
+  for (Eigen::Index column = 0; column < n; ++column) {
+    const auto k = static_cast<Eigen::Index>(chosen[static_cast<std::size_t>(column)]);
+    points.col(column) = problem_.points.col(k);
+    pixels.col(column) = problem_.pixels.col(k) - corner;
+  }
+  if (!rig.is_rig()) {
+    const auto estimate = solve_epnp(points, pixels, rig);
+    return estimate ? std::optional(judge(estimate->T_cw)) : std::nullopt;
+  }
+  const RigMember& member = rig.members()[camera];
+  const auto estimate = solve_epnp(points, pixels, *member.camera);
+  return estimate ? std::optional(judge(member.T_bc * estimate->T_cw)) : std::nullopt;
+}
+
+std::optional<PnpPose> PnpRansac::pose_of_sample() {
+  if (problem_.camera->is_rig()) return pose_of(draw_of_rig());
+  std::vector<std::size_t> sample;
+  for (const int i : sampler_.draw<sample_size>()) sample.push_back(static_cast<std::size_t>(i));
+  return pose_of(sample);
 }
 
 std::optional<PnpPose> PnpRansac::refine_best() const {
-  const auto n = static_cast<Eigen::Index>(best_.n_inliers);
-  Eigen::Matrix3Xd points(3, n);
-  Eigen::Matrix2Xd pixels(2, n);
-  Eigen::Index column = 0;
+  // Of a rig those of the camera with most.
+  std::vector<std::vector<std::size_t>> inliers(problem_.camera->n_cameras());
   for (std::size_t i = 0; i < best_.inliers.size(); ++i) {
     if (!best_.inliers[i]) continue;
-    points.col(column) = problem_.points.col(static_cast<Eigen::Index>(i));
-    pixels.col(column++) = problem_.pixels.col(static_cast<Eigen::Index>(i));
+    const double u = problem_.pixels(0, static_cast<Eigen::Index>(i));
+    inliers[problem_.camera->camera_at(u)].push_back(i);
   }
-  const auto estimate = solve_epnp(points, pixels, *problem_.camera);
-  if (!estimate) return std::nullopt;
-  PnpPose refined = judge(estimate->T_cw);
-  refined.refined = true;
+  const auto most =
+      std::max_element(inliers.begin(), inliers.end(),
+                       [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  std::optional<PnpPose> refined = pose_of(*most);
+  if (refined) refined->refined = true;
+  // A part of the inliers may say less than a lucky sample.
+  if (problem_.camera->is_rig() && (!refined || refined->n_inliers < best_.n_inliers)) return best_;
   return refined;
 }
 

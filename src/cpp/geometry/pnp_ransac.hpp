@@ -37,7 +37,8 @@ struct PnpPose {
 };
 
 /// RANSAC over EPnP, in slices: the tracker lets several candidate keyframes take turns. How the
-/// iterations are sliced does not change what is found. See
+/// iterations are sliced does not change what is found. A sample of a rig is of one of its cameras,
+/// and is judged by the correspondences of all. See
 /// docs/method/relocalization.md#pose-from-points.
 class PnpRansac {
  public:
@@ -59,6 +60,10 @@ class PnpRansac {
  private:
   PnpPose judge(const Pose& T_cw) const;
   std::optional<PnpPose> pose_of_sample();
+  /// The pose by EPnP on some correspondences, of one camera where there are several.
+  std::optional<PnpPose> pose_of(const std::vector<std::size_t>& chosen) const;
+  /// Of a rig: four correspondences of one camera, which is drawn by their numbers.
+  std::vector<std::size_t> draw_of_rig();
   std::optional<PnpPose> refine_best() const;
 
   PnpProblem problem_;
@@ -67,6 +72,9 @@ class PnpRansac {
   int max_iterations_ = 0;
   int iterations_ = 0;
   MinimalSampler sampler_;
+  /// Of a rig: correspondences by camera, and samplers of those of a camera.
+  std::vector<std::vector<std::size_t>> by_camera_;
+  std::vector<MinimalSampler> samplers_;
   PnpPose best_;
 };
 

@@ -15,7 +15,7 @@ constexpr double kLeastDeviation = 1e-6;
 HomogeneousPoint homogeneous(const Camera& camera, const Eigen::Matrix3d& inverse_K, double u,
                              double v) {
   HomogeneousPoint point;
-  point.B = camera.sight(u, v) * inverse_K;
+  point.B = camera.sight(u, v).leftCols<3>() * inverse_K;
   point.h = camera.is_flat() ? Eigen::Vector3d(u, v, 1) : camera.ray(u, v);
   const double scale = point.B.row(2).dot(point.h);
   point.by_pixel = scale * point.B.inverse().leftCols<2>();

@@ -40,12 +40,12 @@ bool is_redundant(const Map& map, KeyFrameId id, bool only_close) {
   const KeyFrame* keyframe = map.find(id);
   if (!keyframe) return false;
   const Frame& frame = *keyframe->frame;
-  const double close_depth = frame.camera->close_depth();
   int n_points = 0, n_redundant = 0;
   for (std::size_t i = 0; i < keyframe->map_points.size(); ++i) {
     const MapPoint* point = map.find(keyframe->map_points[i]);
     if (!point) continue;
-    if (only_close && (!frame.has_depth(i) || frame.depth[i] > close_depth)) continue;
+    if (only_close && !frame.has_depth(i)) continue;
+    if (only_close && frame.depth[i] > frame.camera->close_depth(frame.keypoints[i].x)) continue;
     ++n_points;
     n_redundant += is_redundant(map, *point, *keyframe, i) ? 1 : 0;
   }

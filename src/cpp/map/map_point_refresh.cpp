@@ -96,7 +96,7 @@ void Map::refresh_geometry(MapPoint& refreshed) {
   thread_local std::vector<Eigen::Vector3d> centers;
   centers.clear();
   for (const Observation& observation : refreshed.observations) {
-    centers.push_back(keyframe(observation.keyframe).center());
+    centers.push_back(keyframe(observation.keyframe).center_of(observation.index));
   }
   const PointGeometry geometry = geometry_at(refreshed, refreshed.position, centers);
   refreshed.mean_direction = geometry.mean_direction;

@@ -23,10 +23,11 @@ const Pose* MapRewrite::T_cw(KeyFrameId id) const {
   return slot == slot_of_.end() ? nullptr : &keyframes_[slot->second].T_cw;
 }
 
-MapRewrite::Centers MapRewrite::centers_of(const Map& map) const {
+MapRewrite::Centers MapRewrite::centers_of(const Map& map) {
   Centers center_of;
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
     const Pose* moved = T_cw(keyframe.id);
+    rigs_ |= keyframe.frame->camera->is_rig();
     center_of.emplace(keyframe.id, moved ? moved->center() : keyframe.center());
   });
   return center_of;
@@ -41,6 +42,10 @@ void MapRewrite::prepare_point(const Map& map, const Centers& center_of, MovedPo
     const auto center = center_of.find(observation.keyframe);
     if (center == center_of.end()) return;  // a keyframe that came meanwhile
     centers_.push_back(center->second);
+    const KeyFrame* keyframe = rigs_ ? map.find(observation.keyframe) : nullptr;
+    if (!keyframe) continue;
+    const Pose* pose = T_cw(keyframe->id);
+    centers_.back() = keyframe->frame->center_of(observation.index, pose ? *pose : keyframe->T_cw);
   }
   moved.n_observations = point->observations.size();
   moved.geometry = map.geometry_at(*point, moved.geometry.position, centers_);

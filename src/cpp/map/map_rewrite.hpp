@@ -46,13 +46,14 @@ class MapRewrite {
   };
   using Centers = std::unordered_map<KeyFrameId, Eigen::Vector3d>;
 
-  Centers centers_of(const Map& map) const;
+  Centers centers_of(const Map& map);
   void prepare_point(const Map& map, const Centers& center_of, MovedPoint& moved);
 
   std::vector<MovedKeyFrame> keyframes_;
   std::vector<MovedPoint> points_;
   std::unordered_map<KeyFrameId, std::size_t> slot_of_;  // for look-ups only
   std::vector<Eigen::Vector3d> centers_;                 // of one point at a time
+  bool rigs_ = false;  // a keyframe has several cameras, each with a centre of its own
 };
 
 }  // namespace orbslam

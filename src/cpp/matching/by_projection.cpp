@@ -137,8 +137,10 @@ int match_last_frame(TrackedFrame& current, const TrackedFrame& last, const Poin
   const Pose& T_lw = require_pose(last, "match_last_frame");
   const Frame& frame = *current.frame;
   const Projector projector(frame, T_cw);
+  // The cameras of a rig look in different directions.
+  const bool one_axis = use_depth && !frame.camera->is_rig();
   const Motion motion =
-      use_depth ? motion_along_axis(T_cw, T_lw, frame.camera->baseline()) : Motion::kSideways;
+      one_axis ? motion_along_axis(T_cw, T_lw, frame.camera->baseline()) : Motion::kSideways;
 
   thread_local PointIdIndex batch_index;
   batch_index.reset(points.size());
@@ -182,7 +184,7 @@ void look_at(const Projector& projector, const ScalePyramid& scales, const Point
   view = FrustumView();
   ImagePoint image;
   if (!projector.project_into_frame(points.positions[i], image)) return;
-  const Eigen::Vector3d ray = points.positions[i] - projector.center();
+  const Eigen::Vector3d ray = points.positions[i] - projector.center(image);
   const double distance = ray.norm();
   if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) return;
   const double along = ray.dot(points.mean_directions[i]);
@@ -312,7 +314,7 @@ int match_keyframe_by_projection(const Map& map, KeyFrameId keyframe, TrackedFra
   for (std::size_t i = 0; i < points.size(); ++i) {
     ImagePoint image;
     if (!projector.project_into_frame(points.positions[i], image)) continue;
-    const double distance = (points.positions[i] - projector.center()).norm();
+    const double distance = (points.positions[i] - projector.center(image)).norm();
     if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) continue;
 
     const int level = target.scales->predict_level(points.max_distances[i], distance);

@@ -83,7 +83,7 @@ std::vector<std::int32_t> search_one_way(const Side& from, const Frame& to, cons
     if (!to.camera->project(p, pixel)) continue;
     if (!to.camera->bounds().contains_half_open(pixel.x(), pixel.y())) continue;
     // In the units of the map that the point comes from, like its scale range.
-    const double distance = p.norm() / S.scale();
+    const double distance = (p - to.camera->centre(pixel.x())).norm() / S.scale();
     const double farthest = from.points.max_distances[i];
     if (!in_scale_range(distance, from.points.min_distances[i], farthest)) continue;
     const int level = to.scales->predict_level(farthest, distance);

@@ -46,17 +46,27 @@ class EpipolarGeometry {
   EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b)
       : scales_(*b.frame->scales), camera_1_(*a.frame->camera), camera_2_(*b.frame->camera) {
     on_image_ = camera_1_.is_flat() && camera_2_.is_pinhole();
+    if (camera_1_.is_rig() || camera_2_.is_rig()) {
+      T_21_ = b.T_cw * a.T_cw.inverse();
+      add_epipoles_of_rig();
+      return;
+    }
+    epipoles_.emplace_back();
     const Eigen::Matrix3d K_1 = calibration_of(camera_1_);
     const Eigen::Matrix3d K_2 = on_image_ ? calibration_of(camera_2_) : Eigen::Matrix3d::Identity();
     F_ = fundamental_matrix(a.T_cw, b.T_cw, K_1, K_2);
     const Eigen::Vector3d center = b.T_cw * a.T_cw.center();
     Eigen::Vector2d epipole;
-    if (camera_2_.project(center, epipole)) epipoles_.push_back(epipole);
+    if (camera_2_.project(center, epipole)) epipoles_[0].push_back(epipole);
     // A fisheye lens may show the line through both cameras at both its ends.
-    if (!camera_2_.is_flat() && camera_2_.project(-center, epipole)) epipoles_.push_back(epipole);
+    if (!camera_2_.is_flat() && camera_2_.project(-center, epipole)) {
+      epipoles_[0].push_back(epipole);
+    }
   }
 
   void select(const Keypoint& feature_1) {
+    selected_ = camera_1_.camera_at(feature_1.x);
+    if (T_21_) return select_of_rig(feature_1);
     const Eigen::Vector3d h = camera_1_.is_flat() ? Eigen::Vector3d(feature_1.x, feature_1.y, 1.0)
                                                   : camera_1_.ray(feature_1.x, feature_1.y);
     line_ = F_.transpose() * h;
@@ -65,7 +75,7 @@ class EpipolarGeometry {
 
   // Near the epipole every feature lies on every line, and depth cannot be triangulated.
   bool near_epipole(const Keypoint& feature_2) const {
-    for (const Eigen::Vector2d& epipole : epipoles_) {
+    for (const Eigen::Vector2d& epipole : epipoles_[selected_]) {
       const double du = epipole.x() - feature_2.x, dv = epipole.y() - feature_2.y;
       if (du * du + dv * dv < kEpipoleExclusion * scales_.scale(feature_2.level)) return true;
     }
@@ -81,21 +91,50 @@ class EpipolarGeometry {
   }
 
  private:
+  // Where every camera of 2 shows every camera of 1.
+  void add_epipoles_of_rig() {
+    for (std::size_t i = 0; i < camera_1_.n_cameras(); ++i) {
+      auto& epipoles = epipoles_.emplace_back();
+      const Eigen::Vector3d center = *T_21_ * camera_1_.centre(camera_1_.column_of(i));
+      for (std::size_t j = 0; j < camera_2_.n_cameras(); ++j) {
+        const Eigen::Vector3d opposite = 2 * camera_2_.centre(camera_2_.column_of(j)) - center;
+        Eigen::Vector2d epipole;
+        if (camera_2_.project_into(j, center, epipole)) epipoles.push_back(epipole);
+        if (camera_2_.project_into(j, opposite, epipole)) epipoles.push_back(epipole);
+      }
+    }
+  }
+
+  // The normals of the planes of a feature and each camera of 2.
+  void select_of_rig(const Keypoint& feature_1) {
+    const Eigen::Vector3d ray = T_21_->rotation() * camera_1_.ray(feature_1.x, feature_1.y);
+    const Eigen::Vector3d center = *T_21_ * camera_1_.centre(feature_1.x);
+    normals_.resize(camera_2_.n_cameras());
+    for (std::size_t j = 0; j < normals_.size(); ++j) {
+      normals_[j] = (center - camera_2_.centre(camera_2_.column_of(j))).cross(ray);
+    }
+  }
+
   // Of a feature of 2 from the epipolar plane, whose normal in camera 2 is line_, in raw pixels.
   double squared_distance(const Keypoint& feature_2) const {
     const Eigen::Vector3d ray = camera_2_.ray(feature_2.x, feature_2.y);
-    const Sight B = camera_2_.sight(feature_2.x, feature_2.y);
+    const Eigen::Matrix3d B = camera_2_.sight(feature_2.x, feature_2.y).leftCols<3>();
+    const Eigen::Vector3d& normal = T_21_ ? normals_[camera_2_.camera_at(feature_2.x)] : line_;
     const double scale = B.row(2).dot(ray);
     const Eigen::Matrix<double, 3, 2> by_pixel = scale * B.inverse().leftCols<2>();
-    const double offset = line_.dot(ray);
-    return offset * offset / (by_pixel.transpose() * line_).squaredNorm();
+    const double offset = normal.dot(ray);
+    return offset * offset / (by_pixel.transpose() * normal).squaredNorm();
   }
 
   const ScalePyramid& scales_;
   const Camera &camera_1_, &camera_2_;
   bool on_image_;  // lines of image 2, otherwise planes
   Eigen::Matrix3d F_;
-  std::vector<Eigen::Vector2d> epipoles_;  // image of camera 1, if camera 2 can see it
+  std::optional<Pose> T_21_;  // of rigs
+  // Images of camera 1 that camera 2 can see, for each camera of 1.
+  std::vector<std::vector<Eigen::Vector2d>> epipoles_;
+  std::vector<Eigen::Vector3d> normals_;  // for each camera of a rig 2
+  std::size_t selected_ = 0;              // camera of 1
   Eigen::Vector3d line_ = Eigen::Vector3d::Zero();
   double squared_normal_ = 0;
 };

@@ -24,13 +24,26 @@ Eigen::Vector3d PairTriangulation::View::ray(std::size_t i) const {
   return frame->camera->ray(frame->keypoints[i].x, frame->keypoints[i].y);
 }
 
+Pose PairTriangulation::View::from_world(std::size_t i) const {
+  if (!frame->camera->is_rig()) return T_cw;
+  return Pose::from_unit(T_cw.rotation(),
+                         T_cw.translation() - frame->camera->centre(frame->keypoints[i].x));
+}
+
+Eigen::Vector3d PairTriangulation::View::centre(std::size_t i) const {
+  if (!frame->camera->is_rig()) return T_wc.translation();
+  return T_wc * frame->camera->centre(frame->keypoints[i].x);
+}
+
 // Cosine of the angle under which the baseline is seen from the measured depth.
 double PairTriangulation::View::depth_parallax(std::size_t i, double none) const {
   if (!frame->has_depth(i)) return none;
-  const Camera& camera = *frame->camera;
+  const Camera& rig = *frame->camera;
+  const Camera& camera =
+      rig.is_rig() ? *rig.members()[rig.camera_at(frame->keypoints[i].x)].camera : rig;
   if (camera.has_wide_pair()) {  // of the part of the baseline across the ray
     const Keypoint& keypoint = frame->keypoints[i];
-    const double disparity = camera.disparity(keypoint.x, keypoint.y, frame->depth[i]);
+    const double disparity = rig.disparity(keypoint.x, keypoint.y, frame->depth[i]);
     return std::cos(2.0 * std::atan(disparity / camera.pixels_per_radian() / 2.0));
   }
   return std::cos(2.0 * std::atan2(camera.baseline() / 2.0, frame->depth[i]));
@@ -65,7 +78,7 @@ std::optional<Eigen::Vector3d> PairTriangulation::locate(std::size_t i_1, std::s
 
   if (parallax > 0 && parallax < std::min(parallax_1, parallax_2) &&
       (depth_1 || depth_2 || parallax < kWidestCosine)) {
-    return triangulate(ray_1, ray_2, view_1_.T_cw, view_2_.T_cw);
+    return triangulate(ray_1, ray_2, view_1_.from_world(i_1), view_2_.from_world(i_2));
   }
   // Equally wide: the first, so that the result does not depend on rounding alone.
   if (depth_1 && parallax_1 <= parallax_2) return view_1_.T_wc * view_1_.frame->unproject(i_1);
@@ -76,8 +89,8 @@ std::optional<Eigen::Vector3d> PairTriangulation::locate(std::size_t i_1, std::s
 // The nearer camera must see the feature on the coarser level, about as much as it is nearer.
 bool PairTriangulation::scales_agree(const Eigen::Vector3d& point, std::size_t i_1,
                                      std::size_t i_2) const {
-  const double distance_1 = (point - view_1_.T_wc.translation()).norm();
-  const double distance_2 = (point - view_2_.T_wc.translation()).norm();
+  const double distance_1 = (point - view_1_.centre(i_1)).norm();
+  const double distance_2 = (point - view_2_.centre(i_2)).norm();
   if (!(distance_1 > 0) || !(distance_2 > 0)) return false;
   const ScalePyramid& scales = *view_1_.frame->scales;
   const double by_distance = distance_2 / distance_1;

@@ -29,6 +29,9 @@ class PairTriangulation {
     Pose T_cw, T_wc;
 
     Eigen::Vector3d ray(std::size_t i) const;
+    /// World to the axes of the body, from where the camera of keypoint i is.
+    Pose from_world(std::size_t i) const;
+    Eigen::Vector3d centre(std::size_t i) const;  ///< of that camera, in the world
     double depth_parallax(std::size_t i, double none) const;
     bool sees(const Eigen::Vector3d& point, std::size_t i) const;
   };

@@ -7,9 +7,9 @@
 
 namespace orbslam {
 
-/// Where a world point appears: pixel, column in the (virtual) right image, depth [world units].
+/// Where a world point appears: pixel, column in the (virtual) right image.
 struct ImagePoint {
-  double u = 0, v = 0, right_u = 0, z = 0;
+  double u = 0, v = 0, right_u = 0;
 };
 
 /// Projects many world points into one frame, which must outlive it; points that its camera cannot
@@ -24,7 +24,11 @@ class Projector {
         center_(T_cw.center()),
         camera_(*frame.camera) {}
 
-  const Eigen::Vector3d& center() const { return center_; }
+  /// Of the camera that sees a point at `image`, in the world.
+  Eigen::Vector3d center(const ImagePoint& image) const {
+    if (!camera_.is_rig()) return center_;
+    return rotation_.transpose() * (camera_.centre(image.u) - translation_);
+  }
 
   /// Frames accept both ends of the image bounds.
   bool project_into_frame(const Eigen::Vector3d& p_w, ImagePoint& image) const {
@@ -41,12 +45,11 @@ class Projector {
                               rotation_.row(1).dot(p_w) + translation_.y(),
                               rotation_.row(2).dot(p_w) + translation_.z());
     Eigen::Vector2d uv;
-    if (!camera_.project(p_c, uv)) return false;
+    double disparity = 0;
+    if (!camera_.project(p_c, uv, disparity)) return false;
     image.u = uv.x();
     image.v = uv.y();
-    image.z = p_c.z();
-    image.right_u =
-        image.u - (camera_.is_flat() ? camera_.bf() * (1.0 / image.z) : camera_.disparity(p_c));
+    image.right_u = image.u - disparity;
     return true;
   }
 
@@ -81,7 +84,7 @@ struct ExpectedView {
 inline bool expect_in_keyframe(const Projector& projector, const Frame& frame,
                                const PointBatch& points, std::size_t i, ExpectedView& view) {
   if (!projector.project_into_keyframe(points.positions[i], view.image)) return false;
-  const Eigen::Vector3d ray = points.positions[i] - projector.center();
+  const Eigen::Vector3d ray = points.positions[i] - projector.center(view.image);
   const double distance = ray.norm();
   if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) return false;
   if (!seen_from_near_direction(ray.dot(points.mean_directions[i]), distance)) return false;

@@ -190,7 +190,7 @@ void BlockBundle::fill_sights(const BundleProblem& problem) {
     // Where the lens shows nothing the observation is not usable, and 0 takes it out.
     const Sight B = camera.sight(o.u, o.v);
     for (std::size_t k = 0; k < slots.sight.size(); ++k) {
-      const double entry = B(static_cast<int>(k / 3), static_cast<int>(k % 3));
+      const double entry = sight_entry(B, k);
       slots.sight[k][slot] = std::isfinite(entry) ? entry : 0.0;
     }
   }

@@ -42,7 +42,8 @@ class BlockBundle {
   struct Slots {
     std::vector<double> u, v, right_u, base, weight_u, weight_v, weight_right;
     std::vector<std::uint32_t> view, point;
-    std::array<std::vector<double>, 9> sight;  ///< empty: all cameras are pinholes
+    /// By rows of three, then the last column; empty: all cameras are pinholes.
+    std::array<std::vector<double>, 12> sight;
     void resize(std::size_t n, bool with_sights);
     bundle_kernels::Observations pointers() const;
   };

@@ -43,7 +43,8 @@ struct Observations {
   const double* weight_right;  ///< 0 without depth
   const Index* view;
   const Index* point;
-  const double* sight[9];  ///< by rows; null: all cameras are pinholes
+  /// By rows of three, then the last column; null: all cameras are pinholes.
+  const double* sight[12];
 };
 
 /// Where the observations of a point begin and end, by free and by fixed cameras.

@@ -98,7 +98,7 @@ double BundleMeasurement::evaluate() {
   for (int i = 0; i < 3; ++i) {
     p_c[i] = R(i, 0) * point[0] + R(i, 1) * point[1] + R(i, 2) * point[2] + t(i);
   }
-  const double q = sight(2, 0) * p_c[0] + sight(2, 1) * p_c[1] + sight(2, 2) * p_c[2];
+  const double q = sight(2, 0) * p_c[0] + sight(2, 1) * p_c[1] + sight(2, 2) * p_c[2] + sight(2, 3);
   const bool usable = scale > 0 && std::abs(q) > kTinyDepth;
   if (!usable) {  // also when the point is NaN
     std::fill_n(p_c, 3, 0.0);
@@ -112,7 +112,8 @@ double BundleMeasurement::evaluate() {
   factor = scale;
   for (int row = 0; row < 2; ++row) {
     predicted[row] =
-        (sight(row, 0) * p_c[0] + sight(row, 1) * p_c[1] + sight(row, 2) * p_c[2]) * inverse_q;
+        (sight(row, 0) * p_c[0] + sight(row, 1) * p_c[1] + sight(row, 2) * p_c[2] + sight(row, 3)) *
+        inverse_q;
     residual[row] = -factor * predicted[row];
   }
   const double disparity_error = view->camera().bf() * inverse_q - (u - right_u);

@@ -103,7 +103,7 @@ void Group::pad() {
 
 void Group::push_back(const Sight& B) {
   for (std::size_t k = 0; k < sight.size(); ++k) {
-    sight[k].push_back(B(static_cast<int>(k / 3), static_cast<int>(k % 3)));
+    sight[k].push_back(sight_entry(B, k));
   }
 }
 
@@ -134,7 +134,7 @@ double chi2(const Group& group, std::size_t i, bool stereo, const Camera& camera
       double q[3];
       for (std::size_t row = 0; row < 3; ++row) {
         q[row] = group.sight[3 * row][i] * p.x() + group.sight[3 * row + 1][i] * p.y() +
-                 group.sight[3 * row + 2][i] * p.z();
+                 group.sight[3 * row + 2][i] * p.z() + group.sight[9 + row][i];
       }
       error_r = (q[0] - camera.bf()) / q[2] + (group.u[i] - group.right_u[i]);
     }

@@ -192,7 +192,8 @@ void leave_out_hidden(Group& group, const Camera& camera, const Pose& T_cw) {
     const Eigen::Vector3d point(group.x[i], group.y[i], group.z[i]);
     Eigen::RowVector3d axis(0, 0, 1);
     if (!camera.is_flat()) axis << group.sight[6][i], group.sight[7][i], group.sight[8][i];
-    const double depth = (axis * R).dot(point) + axis.dot(T_cw.translation());
+    const double offset = camera.is_flat() ? 0.0 : group.sight[11][i];
+    const double depth = (axis * R).dot(point) + axis.dot(T_cw.translation()) + offset;
     if (!(depth > pose_kernels::kTinyDepth)) group.weight[i] = 0;
   }
 }

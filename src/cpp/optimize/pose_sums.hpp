@@ -28,7 +28,7 @@ struct Task {
   const double* weight;
   const double* right_factor;  ///< weight of the right column over that of u and v
   bool has_sights;             ///< false: the camera is a pinhole, and u and v say the same
-  const double* sight[9];      ///< by rows
+  const double* sight[12];     ///< by rows of three, then the last column
   double rotation[9];          ///< R_cw by rows
   double translation[3];
   double fx, fy, cx, cy;

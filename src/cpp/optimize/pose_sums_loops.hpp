@@ -114,8 +114,8 @@ inline void add_general_row(Sums& sums, const CameraPoints& p, Lanes a, Lanes b,
   add_row<-1>(sums, row, weight, error);
 }
 
-/// Any camera: the error of a point p against its keypoint is (B.row(0) p, B.row(1) p) /
-/// (B.row(2) p) in pixels, with B the keypoint's sight, and its disparity is bf / (B.row(2) p).
+/// Any camera: the error of a point p against its keypoint is (q.x, q.y) / q.z in pixels with
+/// q = B (p; 1) and B the keypoint's sight, and its disparity is bf / q.z.
 template <bool kStereo, bool kRobust, bool kSystem>
 inline double accumulate_sights(const Task& task, Size first, double* system) {
   const Lanes huber2 = all(task.huber * task.huber), width = all(task.huber);
@@ -126,15 +126,15 @@ inline double accumulate_sights(const Task& task, Size first, double* system) {
   Lanes cost = all(0.0);
   for (Size i = first; i < task.n; i += kLanes) {
     const CameraPoints p = transformed(task, i);
-    Lanes B[9];
-    for (Size k = 0; k < 9; ++k) B[k] = load(task.sight[k] + i);
-    const Lanes q = B[6] * p.x + B[7] * p.y + B[8] * p.z;
+    Lanes B[12];
+    for (Size k = 0; k < 12; ++k) B[k] = load(task.sight[k] + i);
+    const Lanes q = B[6] * p.x + B[7] * p.y + B[8] * p.z + B[11];
     const Mask usable = q * q > tiny2;
     const Lanes inverse = keep(usable, one / q);
     Lanes weight = keep(usable, load(task.weight + i));
     // Measurement minus prediction.
-    const Lanes error_u = -(B[0] * p.x + B[1] * p.y + B[2] * p.z) * inverse;
-    const Lanes error_v = -(B[3] * p.x + B[4] * p.y + B[5] * p.z) * inverse;
+    const Lanes error_u = -(B[0] * p.x + B[1] * p.y + B[2] * p.z + B[9]) * inverse;
+    const Lanes error_v = -(B[3] * p.x + B[4] * p.y + B[5] * p.z + B[10]) * inverse;
     Lanes error_r = all(0.0), factor = one;
     Lanes square = error_u * error_u + error_v * error_v;
     if constexpr (kStereo) {

@@ -20,14 +20,14 @@ std::optional<Residual> residual(const Eigen::Vector3d& p_c,
                                  const Camera& camera, const Eigen::Vector2d& pixel,
                                  double inverse_sigma2) {
   const Sight B = camera.sight(pixel.x(), pixel.y());
-  const Eigen::Vector3d q = B * p_c;
+  const Eigen::Vector3d q = apply(B, p_c);
   // Behind the camera as well: an adjustment may lead a point through its plane and back.
   if (!(std::abs(q.z()) > kTinyDepth)) return std::nullopt;
   const double weight = std::sqrt(inverse_sigma2), inverse_q = 1 / q.z();
   const Eigen::Vector2d predicted = q.head<2>() * inverse_q;
   Residual result;
   result.error = -weight * predicted;
-  result.jacobian = -weight * inverse_q * (B.topRows<2>() - predicted * B.row(2)) * derivative;
+  result.jacobian = -weight * inverse_q * (B.topLeftCorner<2, 3>() - predicted * B.row(2).head<3>()) * derivative;
   result.depth = q.z();
   return result;
 }

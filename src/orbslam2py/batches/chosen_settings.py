@@ -13,6 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings, builtin_settings
 from orbslam2py.settings.builtin import is_builtin_name
 from orbslam2py.settings.reader import read_groups
+from orbslam2py.settings.rig_file import read_rig_groups
 from orbslam2py.settings.settings import looks_like_path
 
 
@@ -89,7 +90,8 @@ def _problem_of(name: str, sensor: Sensor) -> SettingsError | None:
         if is_builtin_name(name):
             builtin_settings(name, sensor)
         else:
-            groups = read_groups(Path(name), sensor, allow_unknown=False, warn=lambda _: None)
+            read = read_rig_groups if sensor is Sensor.RIG else read_groups
+            groups = read(Path(name), sensor, allow_unknown=False, warn=lambda _: None)
             Settings(sensor=sensor, **groups)
     except SettingsError as error:
         return error

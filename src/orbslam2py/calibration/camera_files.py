@@ -7,10 +7,12 @@ import logging
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 from orbslam2py._arguments import cannot_open, is_whole, member_of, path_of, shown
 from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile, ForeignCamera
 from orbslam2py.calibration.foreign_pairs import Pair, pair_settings, raw_camera
+from orbslam2py.calibration.foreign_rigs import rig_settings
 from orbslam2py.calibration.formats import READERS
 from orbslam2py.calibration.lenses import require_supported
 from orbslam2py.calibration.unknown_files import refuse_unknown
@@ -120,6 +122,9 @@ def read_camera_file(
     file = _sized(source, READERS[file_format.value](source))
     if file.note:
         _log.info("%s: %s", path, file.note)
+    if sensor is Sensor.RIG:
+        not_of_rigs = {"--right": right, "--camera": camera, "--baseline": baseline}
+        return _rig_of(path, file, not_of_rigs, fps, depth_factor, n_features)
     if right is None:
         chosen = _choose(path, file, camera, sensor)
     else:
@@ -144,6 +149,27 @@ def read_camera_file(
     if sensor is Sensor.STEREO and settings.camera.is_fisheye and settings.right is None:
         raise SettingsError(f"{path}: {needs_right_camera()}")
     return _made_for(path, settings, sensor, baseline, depth_factor)
+
+
+def _rig_of(
+    path: Path,
+    file: CameraFile,
+    not_of_rigs: dict[str, Any],
+    fps: float | None,
+    depth_factor: float | None,
+    n_features: int | None,
+) -> Settings:
+    for option, given in not_of_rigs.items():
+        if given is not None:
+            raise SettingsError(f"a rig has all cameras of the file; leave {option} out")
+    settings = rig_settings(path, file, fps if fps is not None else file.fps or _RATE)
+    n_features = file.n_features if n_features is None else n_features
+    if n_features is not None:
+        settings = replace(settings, orb=OrbSettings(n_features=n_features))
+    if depth_factor is not None:
+        assert settings.depth is not None
+        settings = replace(settings, depth=replace(settings.depth, raw_per_metre=depth_factor))
+    return settings
 
 
 def _named(path: Path, message: str) -> str:

@@ -21,6 +21,7 @@ from orbslam2py.cli.viewing import (
     ViewerPort,
 )
 from orbslam2py.cli.watching import RecordOption, VideoOption
+from orbslam2py.errors import SettingsError
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -54,6 +55,11 @@ def demo(
     """
     check_kept(video, record, force=force)
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
+    if sensor is Sensor.RIG:
+        raise SettingsError(
+            "the demo has no rig: take mono, stereo or rgbd, or make images of a rig with "
+            "'orbslam2py synthesize FOLDER --rig SETTINGS' and run them"
+        )
     options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=2.8, noise=2)
     sequence = SyntheticSequence(options)
     code = run_and_show(

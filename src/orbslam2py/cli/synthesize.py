@@ -136,6 +136,16 @@ Lens = Annotated[
 ]
 
 
+Rig = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="SETTINGS",
+        help="Settings file of a rig (Camera1.*, Camera2.*, Camera2.T_c1_c2, ...): images of all "
+        "its cameras through their lenses. Then --sensor is rig.",
+    ),
+]
+
+
 def synthesize(
     folder: Annotated[Path, typer.Argument(help="Folder to write; must be new or empty.")],
     world: World = SyntheticWorld.ROOM,
@@ -151,6 +161,7 @@ def synthesize(
     corners: Bends = Corners.ROUND,
     size: Size = None,
     lens: Lens = None,
+    rig: Rig = None,
     seed: Annotated[int, typer.Option(help="Another seed, another world.")] = 0,
     noise: Annotated[float, typer.Option(help="Noise of the images [grey levels].")] = 0.0,
     depth_noise: Annotated[
@@ -182,7 +193,9 @@ def synthesize(
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Write a synthetic sequence with calibration and exact ground truth."""
-    if depth_noise and sensor is not Sensor.RGBD:
+    if rig is not None:
+        sensor = Sensor.RIG
+    if depth_noise and sensor not in (Sensor.RGBD, Sensor.RIG):
         raise SettingsError("--depth-noise is of depth images: --sensor rgbd")
     pair = sensor is Sensor.STEREO
     options = SyntheticOptions(
@@ -213,6 +226,7 @@ def synthesize(
         lens_pair=Settings.load(lens, Sensor.STEREO) if lens is not None and pair else None,
         imu=imu,
         imu_noise=imu_noise,
+        rig=None if rig is None else Settings.load(rig, Sensor.RIG),
     )
     sequence = SyntheticSequence(options)
     console = Console(quiet=quiet)

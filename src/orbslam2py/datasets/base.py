@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,12 +61,17 @@ class Images(EqualByValue):
         Raw depth registered to `image`, single channel (h, w) (RGB-D), else None.
     mask
         uint8 (h, w): no keypoints in `image` where the mask is 0. None: anywhere.
+    cameras
+        Of a rig one entry for each camera: its image; image and depth of a camera with depth
+        images; None if it has none at that moment. `image` is that of the first camera that has
+        one. Of other sensors None.
     """
 
     image: ByteArray
     right: ByteArray | None = None
     depth: NDArray[np.generic] | None = None
     mask: ByteArray | None = None
+    cameras: tuple[Any, ...] | None = None
 
 
 @dataclass(frozen=True)

@@ -152,26 +152,14 @@ class EurocSequence(RecordedSequence):
         See `datasets.base.Sequence.ground_truth`. None also if ``cam0/sensor.yaml`` is missing or
         has no ``T_BS``, because the pose of the camera on the vehicle is then unknown.
         """
-        path = self._root / "state_groundtruth_estimate0" / "data.csv"
-        if not path.is_file():
-            path = self._root / "mocap0" / "data.csv"  # TUM-VI: of the IMU, which is the body
-        if not path.is_file():
-            return None
-        calibration = self._root / "cam0" / "sensor.yaml"
-        if not calibration.is_file():
-            _log.warning("%s is not used: %s with T_BS is missing", path, calibration)
-            return None
-        sensor = read_sensor_yaml(calibration)
-        if sensor.T_body_camera is None:
-            _log.warning("%s is not used: %s has no T_BS", path, calibration)
-            return None
-        body = read_euroc(path)
-        T_body_camera = sensor.T_BS.copy()
-        if self._rectifies:
-            rectification = self._rectification
-            # R of the rectification turns raw into rectified coordinates.
-            T_body_camera[:3, :3] = T_body_camera[:3, :3] @ rectification.left.R.T
-        return Trajectory(body.timestamps, body.T_wc @ T_body_camera)
+        truth = ground_truth_of(self._root)
+        if truth is None or not self._rectifies:
+            return truth
+        rectification = self._rectification
+        # R of the rectification turns raw into rectified coordinates.
+        T_raw_rectified = np.eye(4)
+        T_raw_rectified[:3, :3] = rectification.left.R.T
+        return Trajectory(truth.timestamps, truth.T_wc @ T_raw_rectified)
 
     def imu(self) -> ImuSamples | None:
         """Read ``imu0/data.csv``; see `RecordedSequence.imu`."""
@@ -307,3 +295,25 @@ def _list_folder(folder: Path, rate: float) -> _CameraList:
         times, doubts = clock.nanoseconds, clock.doubts
     lines = list(range(1, len(paths) + 1))
     return _CameraList(folder, times, tuple(map(text_of, times)), paths, lines, doubts)
+
+
+def ground_truth_of(root: Path) -> Trajectory | None:
+    """Read the poses of the body in a ``mav0``, and move them to the raw camera ``cam0``.
+
+    None if there are none, or it is unknown where the camera is on the body.
+    """
+    path = root / "state_groundtruth_estimate0" / "data.csv"
+    if not path.is_file():
+        path = root / "mocap0" / "data.csv"  # TUM-VI: of the IMU, which is the body
+    if not path.is_file():
+        return None
+    calibration = root / "cam0" / "sensor.yaml"
+    if not calibration.is_file():
+        _log.warning("%s is not used: %s with T_BS is missing", path, calibration)
+        return None
+    sensor = read_sensor_yaml(calibration)
+    if sensor.T_body_camera is None:
+        _log.warning("%s is not used: %s has no T_BS", path, calibration)
+        return None
+    body = read_euroc(path)
+    return Trajectory(body.timestamps, body.T_wc @ sensor.T_BS)

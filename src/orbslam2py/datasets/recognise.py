@@ -21,6 +21,7 @@ from orbslam2py.datasets.euroc import EurocSequence, find_root
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.kitti import KittiSequence, find_cameras
 from orbslam2py.datasets.layouts import Loader, find_loaders, loader_of
+from orbslam2py.datasets.rig_folders import RigFolders, is_rig
 from orbslam2py.datasets.stereo_folders import StereoFolders, find_image_pair
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
@@ -177,6 +178,8 @@ def open_sequence(
     folder = path_of(folder, "the folder of the sequence")
     if association is not None:
         association = path_of(association, "association")
+    if layout is None and is_rig(folder, sensor, settings):
+        return RigFolders(folder, sensor, settings=settings)
     loader = None if layout is None else loader_of(str(layout))
     layout = None if layout is None or loader is not None else Layout(layout)
     if layout in _BAGS or (layout is None and loader is None and is_recording(folder)):

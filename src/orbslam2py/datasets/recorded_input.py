@@ -23,6 +23,7 @@ from orbslam2py.datasets.recognise import (
     open_sequence,
 )
 from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.rig_folders import RigFolders, is_rig
 from orbslam2py.datasets.stereo_folders import find_image_pair, no_pair
 from orbslam2py.datasets.video import VideoSequence
 from orbslam2py.errors import DatasetError
@@ -99,6 +100,9 @@ def _open_recorded(
     times: str | Path | None,
     split: bool,
 ) -> IterableSequence:
+    if is_rig(path, sensor, settings):
+        _refuse_split(path, RigFolders.layout, split)
+        return RigFolders(path, sensor, settings=settings, fps=fps, times=times)
     if path.is_file():
         _require_video(path)
         return VideoSequence(path, sensor, settings=settings, fps=fps, times=times, split=split)

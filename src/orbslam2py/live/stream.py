@@ -372,7 +372,7 @@ def _choose_sensor(device: Device, wanted: Sensor | str | None, *, split: bool) 
     if wanted is None:
         return next(sensor for sensor, can in able.items() if can)
     wanted = Sensor(wanted)
-    if not able[wanted]:
+    if not able.get(wanted, False):
         names = ", ".join(str(sensor) for sensor, can in able.items() if can)
         advice = (
             "; if every image holds the left and the right view side by side, take --split of "

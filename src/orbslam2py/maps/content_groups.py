@@ -44,6 +44,8 @@ class ArrayGroup:
             yield field.name, getattr(self, field.name)
 
 
+#: Numbers that `Cameras.mount` has of a camera.
+MOUNT_SIZE = 12
 #: Where `Cameras.lens` has the centre of the right camera of a fisheye pair.
 RIGHT_CENTRE = slice(13, 16)
 
@@ -76,6 +78,15 @@ class Cameras(ArrayGroup):
     lens: FloatArray
     """(c, 16) parameters of that model, zeros after the last one. The last three are the centre of
     the right camera of a fisheye pair in the frame of the left one [m], zeros if there is none."""
+    mount: FloatArray = dataclasses.field(default_factory=lambda: np.zeros((0, MOUNT_SIZE)))
+    """(c, 12) of the cameras of rigs, which follow all others: the row of their rig, 1 if their
+    keypoints are used, camera to body as quaternion x, y, z, w and translation [m], and the centre
+    of the camera that gives them depths [m]. Of other cameras and of rigs -1 and zeros, which
+    an empty array becomes."""
+
+    def __post_init__(self) -> None:
+        if not len(self.mount):
+            object.__setattr__(self, "mount", no_mounts(len(self)))
 
     def __len__(self) -> int:
         return len(self.fx)
@@ -87,7 +98,44 @@ class Cameras(ArrayGroup):
         parameters = [len(one) for _, _, one in _core.camera_models()]
         pairs = [n > 0 and parameters[n - 1] <= RIGHT_CENTRE.start for n in self.model.tolist()]
         lens[pairs, RIGHT_CENTRE] *= scale
-        return replace(self, bf=scale * self.bf, lens=lens)
+        mount = self.mount.copy()
+        mount[:, 6:] *= scale
+        return replace(self, bf=scale * self.bf, lens=lens, mount=mount)
+
+    @property
+    def has_rigs(self) -> bool:
+        """Whether keyframes have several cameras, whose images lie side by side in one plane."""
+        return bool((self.mount[:, 0] >= 0).any())
+
+    def rig(self, row: int) -> _core.Camera | None:
+        """Return the cameras of a rig as one of the core; None for a single camera."""
+        rows = np.flatnonzero(self.mount[:, 0] == row).tolist()
+        if not rows:
+            return None
+        cameras, poses = [], []
+        for own in rows:
+            lens: dict[str, Any] = {}
+            model = self.camera_model(own)
+            if model is not None:
+                lens["model"] = model.core
+            cameras.append(
+                _core.Camera(
+                    _core.CameraOptions(
+                        fx=self.fx[own],
+                        fy=self.fy[own],
+                        cx=self.cx[own],
+                        cy=self.cy[own],
+                        width=int(self.width[own]),
+                        height=int(self.height[own]),
+                        distortion=self.distortion[own].tolist(),
+                        bf=self.bf[own],
+                        depth_ratio=self.depth_ratio[own],
+                        **lens,
+                    )
+                )
+            )
+            poses.append(_core.Pose(self.mount[own, 2:6], self.mount[own, 6:9]))
+        return _core.Camera.rig(cameras, poses, [True] * len(rows))
 
     def camera_model(self, row: int) -> CameraModel | None:
         """Return the model of a fisheye lens, or None for a pinhole."""
@@ -97,6 +145,13 @@ class Cameras(ArrayGroup):
         name, _, parameters = _core.camera_models()[number - 1]
         size = (int(self.width[row]), int(self.height[row]))
         return CameraModel(name, self.lens[row, : len(parameters)], size)
+
+
+def no_mounts(n: int) -> FloatArray:
+    """Return `Cameras.mount` of cameras that belong to no rig."""
+    mounts = np.zeros((n, MOUNT_SIZE))
+    mounts[:, 0] = -1
+    return mounts
 
 
 #: Numbers that a map file keeps of a camera model.

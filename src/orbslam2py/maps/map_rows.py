@@ -161,6 +161,7 @@ def _camera_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
                 int(cameras.n_levels[row]),
                 model_name_of(int(cameras.model[row])),
                 cameras.lens[row].astype("<f8").tobytes(),
+                cameras.mount[row].astype("<f8").tobytes(),
             ),
         )
 

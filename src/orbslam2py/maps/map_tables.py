@@ -19,6 +19,7 @@ from orbslam2py._arrays import IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
     LENS_SIZE,
+    MOUNT_SIZE,
     Cameras,
     Covisibility,
     Keyframes,
@@ -26,10 +27,11 @@ from orbslam2py.maps.content_groups import (
     Points,
     RemovedKeyframes,
     model_number_of,
+    no_mounts,
 )
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_rows import Row, checksum
-from orbslam2py.maps.schema import RATIONAL_LENS, Blob, Table
+from orbslam2py.maps.schema import RATIONAL_LENS, RIG_MOUNT, Blob, Table
 
 #: Keyframes whose keypoints are read at once: a few megabytes.
 _PART = 64
@@ -289,8 +291,20 @@ def _read_cameras(rows: list[Row], table: Table) -> Cameras:
         height=column("height", np.int64),
         scale_factor=column("scale_factor", np.float32),
         n_levels=column("n_levels", np.int64),
+        mount=_mounts(rows, table),
         **_lenses(rows, table),
     )
+
+
+def _mounts(rows: list[Row], table: Table) -> NDArray[Any]:
+    """How cameras of rigs are mounted; files of earlier versions have no rigs."""
+    if RIG_MOUNT[0] not in table.columns:
+        return no_mounts(len(rows))
+    mounts = [row[table.columns.index(RIG_MOUNT[0])] for row in rows]
+    if any(len(mount) != MOUNT_SIZE * 8 for mount in mounts):
+        raise MapFileError("the mount of a camera has the wrong length")
+    found = np.array([np.frombuffer(mount, "<f8") for mount in mounts], np.float64)
+    return found.reshape(-1, MOUNT_SIZE)
 
 
 def _lenses(rows: list[Row], table: Table) -> dict[str, NDArray[Any]]:

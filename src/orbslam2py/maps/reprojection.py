@@ -27,9 +27,27 @@ def reprojection_errors(contents: MapContents) -> FloatArray:
     keyframes, observations = contents.keyframes, contents.observations
     rows = np.searchsorted(keyframes.ids, observations.keyframe)
     points = np.searchsorted(contents.points.ids, observations.point)
-    expected = project_points(contents, rows, points, np.zeros(len(rows), bool))
     seen = keyframes.keypoints[contents.observed_keypoints]
+    if contents.cameras.has_rigs:
+        return _errors_of_rigs(contents, rows, points, seen)
+    expected = project_points(contents, rows, points, np.zeros(len(rows), bool))
     return np.asarray(np.linalg.norm(expected - seen, axis=1))
+
+
+def _errors_of_rigs(
+    contents: MapContents, rows: IntArray, points: IntArray, seen: NDArray[np.float32]
+) -> FloatArray:
+    """Distances of keypoints from the pixels at which the camera of each predicts its point."""
+    T = contents.keyframes.T_cw[rows]
+    X = np.einsum("sij,sj->si", T[:, :3, :3], contents.points.positions[points]) + T[:, :3, 3]
+    camera = contents.keyframes.camera[rows]
+    errors = np.full(len(rows), np.nan)
+    for number in np.unique(camera).tolist():
+        rig, own = contents.cameras.rig(number), camera == number
+        if rig is not None:
+            pixels = np.ascontiguousarray(seen[own], np.float64)
+            errors[own] = np.linalg.norm(rig.errors(np.ascontiguousarray(X[own]), pixels), axis=1)
+    return errors
 
 
 def project_points(

@@ -8,8 +8,8 @@ from typing import NamedTuple
 #: Tells map files from other SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
 #: Version of the format that is written; later ones are refused. Version 1 had no words, and
-#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses.
-FORMAT_VERSION = 4
+#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses, version 4 no rigs.
+FORMAT_VERSION = 5
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
 #: Programs that know nothing of it take it for a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
@@ -106,6 +106,8 @@ RATIONAL_LENS = ("k4", "k5", "k6")
 #: zeros after the last one; the last three are the centre of the right camera of a fisheye pair
 #: [m]. A pinhole has an empty name.
 FISHEYE_LENS = ("model", "lens")
+#: Of a camera of a rig since version 5: how it is mounted, float64 (12,); see `Cameras.mount`.
+RIG_MOUNT = ("mount",)
 #: A pose as 7 float64: unit quaternion x, y, z, w, then the translation. A blob, because SQLite
 #: does not keep the sign of a zero in a REAL column.
 POSE = "pose"
@@ -123,6 +125,7 @@ TABLES = {
                 *("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", *RATIONAL_LENS),
                 *("bf", "depth_ratio", "width", "height", "scale_factor", "n_levels"),
                 *FISHEYE_LENS,
+                *RIG_MOUNT,
             ),
         ),
         Table(
@@ -148,8 +151,10 @@ TABLES = {
 def tables_of(version: int) -> dict[str, Table]:
     """The tables of a version of the format."""
     older: dict[str, Table] = {}
-    if version < 4:
-        later = (*FISHEYE_LENS, *(RATIONAL_LENS if version < 3 else ()))
+    if version < 5:
+        later: tuple[str, ...] = RIG_MOUNT
+        later += FISHEYE_LENS if version < 4 else ()
+        later += RATIONAL_LENS if version < 3 else ()
         cameras = TABLES["cameras"]
         values = tuple(value for value in cameras.values if value not in later)
         older["cameras"] = cameras._replace(values=values)
@@ -174,6 +179,7 @@ def create_script(version: int = FORMAT_VERSION) -> str:
     lens = [name for name in tables["cameras"].values if name in RATIONAL_LENS]
     rational_lens = "".join(f"  {name} REAL NOT NULL,\n" for name in lens)
     fisheye = "  model TEXT NOT NULL,\n  lens BLOB NOT NULL,\n" if version >= 4 else ""
+    fisheye += "  mount BLOB NOT NULL,\n" if version >= 5 else ""
     return _CREATE.format(
         version=version, keypoints=keypoints, rational_lens=rational_lens, fisheye_lens=fisheye
     )

@@ -98,3 +98,5 @@ def _differences(saved: Settings, present: Settings, where: str = "in the map") 
             # As it is written in the file: 0 or 1, not False or True.
             now, before = (int(v) if key.kind is bool else v for v in (now, before))
             yield f"{key.name} is {now}, {where} {before}"
+    if present.rig != saved.rig:
+        yield f"cameras or extrinsics of the rig are other ones than {where}"

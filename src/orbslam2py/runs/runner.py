@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -267,7 +267,9 @@ class SequenceRunner:
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
         sensor = self._options.sensor
-        second = images.right if sensor is Sensor.STEREO else images.depth
+        second: Any = images.right if sensor is Sensor.STEREO else images.depth
+        if sensor is Sensor.RIG:
+            second = images.cameras
         if second is None and sensor is not Sensor.MONOCULAR:
             # Not a spoilt frame, which is skipped: all others lack it, too.
             raise DatasetError("the sequence delivers no second image for this sensor")

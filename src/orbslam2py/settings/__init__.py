@@ -16,6 +16,7 @@ from orbslam2py.settings.groups import (
 from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.settings.imu_files import read_imu_settings
 from orbslam2py.settings.imu_presets import ImuNoise, imu_noise
+from orbslam2py.settings.rig import RigCamera
 from orbslam2py.settings.right_camera import RightCamera
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, builtin_settings, resolve_settings
@@ -32,6 +33,7 @@ __all__ = [
     "ImuSettings",
     "Misfit",
     "OrbSettings",
+    "RigCamera",
     "RightCamera",
     "Sensor",
     "Settings",

@@ -16,6 +16,7 @@ from orbslam2py.settings.groups import CameraRectification, CameraSettings
 from orbslam2py.settings.opencv_yaml import scan
 from orbslam2py.settings.pair_views import LEAST_OVERLAP, views_of_pair
 from orbslam2py.settings.reader import groups_of_text, read_text
+from orbslam2py.settings.rig_file import is_rig_text, rig_of_text
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import (
     Settings,
@@ -54,6 +55,8 @@ class ChosenSettings:
         """Return the sensor that the keys of the file suggest."""
         if self.text is None:
             return builtin_sensors(self.choice)[0]
+        if is_rig_text(self.text):
+            return Sensor.RIG
         keys = translate(scan(self.text), Sensor.MONOCULAR).entries
         if "DepthMapFactor" in keys:
             return Sensor.RGBD
@@ -68,7 +71,10 @@ class ChosenSettings:
         if self.text is None:
             return builtin_sensors(self.choice)
         likely = self.likely_sensor
-        others = [one for one in Sensor if one is Sensor.MONOCULAR or likely is Sensor.STEREO]
+        if likely is Sensor.RIG:
+            return (likely,) if _is_complete(self.text, self.choice, likely) else ()
+        pairs = [one for one in Sensor if one is not Sensor.RIG]
+        others = [one for one in pairs if one is Sensor.MONOCULAR or likely is Sensor.STEREO]
         sensors = [likely, *(one for one in others if one is not likely)]
         return tuple(sensor for sensor in sensors if _is_complete(self.text, self.choice, sensor))
 
@@ -158,9 +164,8 @@ def _raw_camera(one: CameraRectification) -> CameraSettings:
 
 def _is_complete(text: str, source: str, sensor: Sensor) -> bool:
     try:
-        groups = groups_of_text(
-            text, Path(source), sensor, allow_unknown=False, warn=lambda _: None
-        )
+        read = rig_of_text if sensor is Sensor.RIG else groups_of_text
+        groups = read(text, Path(source), sensor, allow_unknown=False, warn=lambda _: None)
         settings = Settings(sensor=sensor, **groups)
     except SettingsError:
         return False

@@ -18,13 +18,14 @@ import numpy as np
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.camera_model import CameraModel
+from orbslam2py.settings.extrinsics import checked_extrinsics, inverse_of
 from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,
     StereoRectification,
 )
 from orbslam2py.settings.rectify import rectification_of_pair
-from orbslam2py.settings.right_camera import RightCamera, checked_extrinsics, inverse_of
+from orbslam2py.settings.right_camera import RightCamera
 
 #: Most stretching of a fisheye image, at the middle of its borders and along the radius.
 MOST_STRETCH = 3.0

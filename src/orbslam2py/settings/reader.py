@@ -162,6 +162,7 @@ def groups_of_text(
         rectification=rectification,
         viewer=ViewerSettings(**values["viewer"]),
         right=document.right,
+        rig=None,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from orbslam2py._arguments import shown
 from orbslam2py._arrays import EqualByValue, FloatArray, MadeAgainByCopies
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings.extrinsics import checked_extrinsics, inverse_of
 from orbslam2py.settings.groups import (
     CameraSettings,
     DepthSettings,
@@ -18,62 +19,7 @@ from orbslam2py.settings.groups import (
     StereoRectification,
     ViewerSettings,
 )
-
-#: Largest error of the rotation of an extrinsic matrix; printed ones have some six digits.
-_ROTATION_TOLERANCE = 1e-3
-
-
-def checked_extrinsics(T: object, name: str) -> FloatArray:
-    """Take a rigid transform between two cameras.
-
-    Parameters
-    ----------
-    T
-        4 x 4 numbers: a rotation and a translation [m].
-    name
-        What it is called, for messages.
-
-    Returns
-    -------
-    FloatArray
-        float64 (4, 4), read-only.
-
-    Raises
-    ------
-    SettingsError
-        If it is no rigid transform, or both cameras stand in one place.
-    """
-    try:
-        pose = np.array(T, dtype=np.float64)
-    except (TypeError, ValueError):
-        pose = np.zeros(0)
-    if not _is_rigid(pose):
-        raise SettingsError(
-            f"{name} is no rigid transform; give 4 x 4 numbers: a rotation and a translation in "
-            "metres, with the last row 0, 0, 0, 1"
-        )
-    if not pose[:3, 3].any():
-        raise SettingsError(
-            "the two cameras of the pair stand in one place, so they see no depth; look at where "
-            "their calibration puts them, or use one of them (--sensor mono)"
-        )
-    pose.setflags(write=False)
-    return pose
-
-
-def inverse_of(T: FloatArray) -> FloatArray:
-    """Return the inverse of a rigid transform (4, 4)."""
-    inverse = np.eye(4)
-    inverse[:3, :3], inverse[:3, 3] = T[:3, :3].T, -T[:3, :3].T @ T[:3, 3]
-    return inverse
-
-
-def _is_rigid(T: FloatArray) -> bool:
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        return False
-    R = T[:3, :3]
-    off = float(np.abs(R @ R.T - np.eye(3)).max()), float(np.abs(T[3] - (0, 0, 0, 1)).max())
-    return off[0] < _ROTATION_TOLERANCE and off[1] < 1e-6 and float(np.linalg.det(R)) > 0
+from orbslam2py.settings.rig import RigCamera
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,3 +77,4 @@ class SettingsGroups(TypedDict):
     rectification: StereoRectification | None
     viewer: ViewerSettings
     right: RightCamera | None
+    rig: tuple[RigCamera, ...] | None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The three kinds of sensors."""
+"""The kinds of sensors."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ class Sensor(str, Enum, metaclass=_NamedByText):
     MONOCULAR = "mono"
     STEREO = "stereo"
     RGBD = "rgbd"
+    RIG = "rig"
 
     @classmethod
     def _missing_(cls, value: object) -> Sensor:
@@ -37,7 +38,7 @@ class Sensor(str, Enum, metaclass=_NamedByText):
 
     @property
     def has_depth(self) -> bool:
-        """Whether a single image gives metric depth (stereo and RGB-D)."""
+        """Whether the images of one moment give metric depth (all but a single camera)."""
         return self is not Sensor.MONOCULAR
 
     def __str__(self) -> str:

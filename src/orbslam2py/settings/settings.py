@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from orbslam2py._arguments import path_of, shown
 from orbslam2py._files import atomic_write
@@ -31,6 +34,16 @@ from orbslam2py.settings.groups import (
     raise_if_any,
 )
 from orbslam2py.settings.reader import groups_of_text, read_groups
+from orbslam2py.settings.rig import (
+    USUAL_CLOSE_FACTOR,
+    VIRTUAL_BASELINE,
+    RigCamera,
+    checked_rig,
+    depth_sources,
+    describe_rig,
+    doubts_of_rig,
+)
+from orbslam2py.settings.rig_file import format_rig, read_rig_groups, rig_of_text
 from orbslam2py.settings.right_camera import RightCamera, SettingsGroups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
@@ -69,6 +82,8 @@ class Settings:
         Appearance of the map view.
     right
         The right camera of a fisheye pair, whose images are matched as they are; else None.
+    rig
+        The cameras of a rig, the first of which is the body and is also `camera`; else None.
 
     Raises
     ------
@@ -83,6 +98,7 @@ class Settings:
     rectification: StereoRectification | None = None
     viewer: ViewerSettings = field(default_factory=ViewerSettings)
     right: RightCamera | None = None
+    rig: tuple[RigCamera, ...] | None = None
 
     if TYPE_CHECKING:  # text is taken for a sensor, which the type of the field cannot say
 
@@ -95,6 +111,7 @@ class Settings:
             rectification: StereoRectification | None = None,
             viewer: ViewerSettings = ...,
             right: RightCamera | None = None,
+            rig: Sequence[RigCamera] | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -105,6 +122,7 @@ class Settings:
                 object.__setattr__(self, "camera", replace(self.camera, bf=0.0))
             object.__setattr__(self, "depth", None)
         self._take_baseline()
+        self._take_rig()
         problems = []
         if self.sensor.has_depth:
             if not self.camera.bf > 0:
@@ -134,6 +152,35 @@ class Settings:
             )
         bf = self.right.baseline * self.camera.pixels_per_radian
         object.__setattr__(self, "camera", replace(self.camera, bf=bf))
+
+    def _take_rig(self) -> None:
+        """Take the camera of the body, and its baseline, from the rig."""
+        if self.sensor is not Sensor.RIG:
+            object.__setattr__(self, "rig", None)
+            return
+        if self.rig is None:
+            raise SettingsError(
+                "a rig needs its cameras: a file with Camera1.*, Camera2.*, ..., which "
+                "import-camera makes of a calibration of all cameras (--sensor rig), or "
+                "rig=[RigCamera(...), ...]"
+            )
+        rig = checked_rig(self.rig)
+        object.__setattr__(self, "rig", rig)
+        depth = self.depth or DepthSettings(USUAL_CLOSE_FACTOR)
+        object.__setattr__(self, "depth", depth)
+        if any(camera.depth for camera in rig) and depth.raw_per_metre is None:
+            raise SettingsError(
+                "DepthMapFactor (depth.raw_per_metre) is missing; depth images need it: 1000 for "
+                "millimetres, 5000 for TUM, 1 for metres"
+            )
+        source = next(source for source in depth_sources(rig) if source.has_depth)
+        apart = VIRTUAL_BASELINE
+        if source.partner is not None:
+            own = rig[depth_sources(rig).index(source)]
+            apart = float(np.linalg.norm(rig[source.partner].centre - own.centre))
+        camera = rig[0].camera
+        bf = apart * camera.pixels_per_radian
+        object.__setattr__(self, "camera", replace(camera, bf=bf))
 
     def _check_types(self) -> None:
         for name, kind in _GROUPS.items():
@@ -167,7 +214,8 @@ class Settings:
 
     def doubts(self) -> list[str]:
         """Return values that are allowed but probably wrong, such as a baseline in millimetres."""
-        return find_doubts(self.sensor, self._groups())
+        doubts = find_doubts(self.sensor, self._groups())
+        return doubts if self.rig is None else doubts + doubts_of_rig(self.rig)
 
     def check_for(self, sensor: Sensor | str) -> None:
         """Raise `SettingsError` unless these settings are for this sensor."""
@@ -225,6 +273,8 @@ class Settings:
 
     def to_yaml(self) -> str:
         """Return the text of the settings file that `save` writes."""
+        if self.rig is not None:
+            return format_rig(self._groups())
         return format_settings(self.sensor, self._groups())
 
     def _groups(self) -> SettingsGroups:
@@ -235,6 +285,7 @@ class Settings:
             rectification=self.rectification,
             viewer=self.viewer,
             right=self.right,
+            rig=self.rig,
         )
 
     @classmethod
@@ -256,13 +307,15 @@ class Settings:
             As for `load`; doubts are not logged.
         """
         sensor = Sensor(sensor)
-        groups = groups_of_text(text, Path(source), sensor, allow_unknown=False)
+        read = rig_of_text if sensor is Sensor.RIG else groups_of_text
+        groups = read(text, Path(source), sensor, allow_unknown=False)
         return cls(sensor=sensor, **groups)
 
     def describe(self) -> list[str]:
         """Return these settings line by line, for a log."""
         camera, orb = self.camera, self.orb
-        lines = [
+        lines = [] if self.rig is None else describe_rig(self.rig)
+        lines += [
             f"camera ({self.sensor}): fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, "
             f"cy {camera.cy:g}, {camera.fps:g} fps, colour order {'RGB' if camera.rgb else 'BGR'}",
             _lens_line(camera),
@@ -366,4 +419,5 @@ def looks_like_path(choice: str | PathLike[str]) -> bool:
 
 
 def _settings_of_file(path: Path, sensor: Sensor, *, allow_unknown: bool = False) -> Settings:
-    return Settings(sensor=sensor, **read_groups(path, sensor, allow_unknown=allow_unknown))
+    read = read_rig_groups if sensor is Sensor.RIG else read_groups
+    return Settings(sensor=sensor, **read(path, sensor, allow_unknown=allow_unknown))

@@ -35,7 +35,7 @@ def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
             continue
         lines += ["", f"# {title}"]
         fisheye = group == "camera" and groups["camera"].is_fisheye
-        lines += _lens_lines(groups["camera"]) if fisheye else []
+        lines += lens_lines(groups["camera"]) if fisheye else []
         for key in KEYS:
             if fisheye and key.field in DISTORTION_FIELDS:
                 continue
@@ -51,15 +51,15 @@ def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
             lines.append(f"{side}.width: {camera.width}")
             lines.append(f"{side}.height: {camera.height}")
             for name in "KDRP":
-                lines += _matrix(f"{side}.{name}", getattr(camera, name))
+                lines += matrix_lines(f"{side}.{name}", getattr(camera, name))
             if camera.model != PINHOLE:
                 lines.append(f"{side}.model: {TYPES[camera.model]}")
     lines += _right_lines(groups["right"])
     return "\n".join(lines) + "\n"
 
 
-def _lens_lines(camera: CameraSettings, key: str = "Camera") -> list[str]:
-    """The model of a fisheye lens and its parameters."""
+def lens_lines(camera: CameraSettings, key: str = "Camera") -> list[str]:
+    """Return the model of a fisheye lens and its parameters."""
     names = LENS_PARAMETERS[camera.model]
     lines = [f"{key}.type: {TYPES[camera.model]}"]
     return lines + [f"{key}.{n}: {value!r}" for n, value in zip(names, camera.lens, strict=True)]
@@ -72,19 +72,20 @@ def _right_lines(right: RightCamera | None) -> list[str]:
     camera = right.camera
     lines = ["", "# Right camera of a fisheye pair; T_c1_c2 maps its coordinates to the left ones"]
     if camera.is_fisheye:
-        lines += _lens_lines(camera, "Camera2")
+        lines += lens_lines(camera, "Camera2")
     else:
         names = zip(DISTORTION_FIELDS, camera.distortion.tolist(), strict=False)
         lines += ["Camera2.type: PinHole", *(f"Camera2.{n}: {value!r}" for n, value in names)]
     lines += [f"Camera2.{n}: {getattr(camera, n)!r}" for n in ("fx", "fy", "cx", "cy")]
-    return lines + _matrix("Stereo.T_c1_c2", right.T_left_right)
+    return lines + matrix_lines("Stereo.T_c1_c2", right.T_left_right)
 
 
 def _number(key: Key, value: float) -> str:
     return repr(float(value)) if key.kind is float else str(int(value))
 
 
-def _matrix(name: str, values: FloatArray) -> list[str]:
+def matrix_lines(name: str, values: FloatArray) -> list[str]:
+    """Return a matrix as OpenCV writes it."""
     rows = np.atleast_2d(values)
     text = ",\n      ".join(", ".join(repr(float(item)) for item in row) for row in rows)
     return [

@@ -341,6 +341,7 @@ class AlignmentConfig:
             Sensor.RGBD: self.rgbd,
             Sensor.STEREO: self.stereo,
             Sensor.MONOCULAR: self.monocular,
+            Sensor.RIG: False,
         }
         if not on[sensor]:
             return replace(self, right_image=False, new_keyframes=False, tracked_inliers=0)

@@ -151,6 +151,9 @@ def arrays_of(
     if hasattr(images, "image"):
         some: Any = images
         mask = getattr(some, "mask", None)
+        if sensor is Sensor.RIG:
+            cameras = _present(getattr(some, "cameras", None), "images of all cameras", timestamp)
+            return some.image, cameras, None
         if sensor is Sensor.MONOCULAR:
             return some.image, None, mask
         if sensor is Sensor.RGBD:
@@ -162,6 +165,13 @@ def arrays_of(
         right = _present(getattr(some, "right", None), "right image", timestamp)
         # The mask is the left image's; what it hides there needs no partner.
         return some.image, right, None if mask is None else (mask, None)
+    if sensor is Sensor.RIG:
+        if not isinstance(images, tuple | list):
+            raise ImageError(
+                f"the frame of {timestamp} s has one image; sensor 'rig' needs a sequence with one "
+                "for each camera, None for a camera that gave none"
+            )
+        return next((one for one in images if one is not None), None), images, None  # type: ignore[return-value]
     several: Any = images if isinstance(images, tuple | list) else (images,)
     wanted = 1 if sensor is Sensor.MONOCULAR else 2
     if len(several) != wanted:

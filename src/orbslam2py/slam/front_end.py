@@ -64,7 +64,7 @@ class FrontEnd:
         self._sensor = sensor
         self._context: core.FrameContext | None = None
         self._size: tuple[int, int] | None = None
-        options = _orb_options(settings)
+        options = orb_options(settings)
         self._extractor = core.OrbExtractor(options)
         # By the factor on the number of features; more while a single camera starts.
         self._extractors = {1: self._extractor}
@@ -102,7 +102,7 @@ class FrontEnd:
     ) -> core.Frame:
         """Frame of a single camera; with a multiple of the settings' features."""
         self._check(image, "image")
-        _check_mask(mask, image, "mask")
+        check_mask(mask, image, "mask")
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
@@ -113,7 +113,7 @@ class FrontEnd:
 
     def _extractor_for(self, factor: int) -> core.OrbExtractor:
         if factor not in self._extractors:
-            options = _orb_options(self._settings, factor=factor)
+            options = orb_options(self._settings, factor=factor)
             self._extractors[factor] = core.OrbExtractor(options)
         return self._extractors[factor]
 
@@ -140,8 +140,8 @@ class FrontEnd:
         if isinstance(mask, tuple) and len(mask) != 2:
             raise ImageError(f"a tuple of masks must hold two (left, right), got {len(mask)}")
         left_mask, right_mask = mask if isinstance(mask, tuple) else (mask, mask)
-        _check_mask(left_mask, left, "left mask")
-        _check_mask(right_mask, right, "right mask")
+        check_mask(left_mask, left, "left mask")
+        check_mask(right_mask, right, "right mask")
         if not self.pair_check.done:
             self.pair_check.look(left, right)
         context = self._context_for(left)
@@ -188,17 +188,8 @@ class FrontEnd:
     ) -> core.Frame:
         """Frame of a colour image with registered depth."""
         self._check(image, "image")
-        if not isinstance(depth, np.ndarray) or depth.ndim != 2:
-            shape = getattr(depth, "shape", None)
-            raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
-        # Where a masked array hides the depth there is none; nor may a matrix's own rules count.
-        depth = np.asarray(np.ma.filled(depth, 0))
-        if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
-            raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
-        depth = self._enlarged(depth, image)
-        _check_mask(mask, image, "mask")
-        if not self.depth_check.done:
-            self.depth_check.look(depth)
+        depth = self._depth_of(depth, image)
+        check_mask(mask, image, "mask")
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
@@ -208,6 +199,22 @@ class FrontEnd:
                 context, frame_id, timestamp, extraction, depth, self._settings.depth_factor
             )
             return self._finished(frame, image, grey, extraction)
+
+    def _depth_of(
+        self, depth: npt.NDArray[np.generic], image: npt.NDArray[np.uint8]
+    ) -> npt.NDArray[np.generic]:
+        """Check a depth image and bring it to the size of its image."""
+        if not isinstance(depth, np.ndarray) or depth.ndim != 2:
+            shape = getattr(depth, "shape", None)
+            raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
+        # Where a masked array hides the depth there is none; nor may a matrix's own rules count.
+        depth = np.asarray(np.ma.filled(depth, 0))
+        if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
+            raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
+        depth = self._enlarged(depth, image)
+        if not self.depth_check.done:
+            self.depth_check.look(depth)
+        return depth
 
     def _enlarged(
         self, depth: npt.NDArray[np.generic], image: npt.NDArray[np.uint8]
@@ -294,7 +301,8 @@ def _size_text(image: npt.NDArray[np.generic]) -> str:
     return f"{image.shape[1]}x{image.shape[0]}"
 
 
-def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:
+def check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:
+    """Raise `ImageError` unless a mask belongs to its image."""
     if mask is None:
         return
     if not isinstance(mask, np.ndarray) or mask.dtype != np.uint8:
@@ -316,7 +324,8 @@ def _refuse_masked(array: npt.NDArray[np.uint8], what: str) -> None:
         )
 
 
-def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
+def orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
+    """Return the options of the extraction, with a multiple of the settings' features."""
     return core.OrbOptions(
         n_features=factor * settings.orb.n_features,
         scale_factor=settings.orb.scale_factor,

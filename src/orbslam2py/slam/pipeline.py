@@ -30,7 +30,6 @@ from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
-from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput, InertialTracker
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
@@ -47,6 +46,7 @@ from orbslam2py.slam.records import (
     Verdict,
 )
 from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.rig_front_end import RigFrontEnd, front_end_of
 from orbslam2py.slam.tracking import Tracking
 from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
 
@@ -102,9 +102,8 @@ class Pipeline:
         self._vocabulary = setup.vocabulary
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images
-        self.front_end = FrontEnd(
+        self.front_end = front_end_of(
             setup.settings,
-            sensor,
             check_calibration=options.check_calibration,
             keep_images=alignment.uses_points,
             align_right=alignment.right_image,
@@ -173,6 +172,8 @@ class Pipeline:
     ) -> core.Frame:
         """Make a frame of the images of one moment; see `System.track`."""
         front_end = self.front_end
+        if isinstance(front_end, RigFrontEnd):
+            return front_end.rig(second, frame_id, timestamp, timer, mask)
         if self._sensor is Sensor.STEREO:
             return front_end.stereo(image, second, frame_id, timestamp, timer, mask)
         if self._sensor is Sensor.RGBD:

@@ -52,6 +52,7 @@ from orbslam2py.slam.inertial import ImuCheck
 from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pipeline import Pipeline
 from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
+from orbslam2py.slam.rig_front_end import RigFrontEnd
 from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
@@ -250,6 +251,8 @@ class System:
             self.pipeline.inertial.add(imu)
         first, second, own_mask = arrays_of(images, self.sensor, timestamp)
         chosen = own_mask if mask is None else mask
+        if isinstance(self.pipeline.front_end, RigFrontEnd):
+            first = self.pipeline.front_end.mosaic(second or ())
 
         def build(frame_id: int, timer: StageTimer) -> core.Frame:
             return self.pipeline.build_frame(first, second, frame_id, timestamp, timer, chosen)

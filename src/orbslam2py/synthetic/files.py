@@ -39,8 +39,8 @@ _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 _SENSORS = {
     Layout.TUM: (Sensor.MONOCULAR, Sensor.RGBD),
     Layout.KITTI: (Sensor.MONOCULAR, Sensor.STEREO),
-    Layout.EUROC: (Sensor.MONOCULAR, Sensor.STEREO),
-    **dict.fromkeys(map(Layout, BAG_LAYOUTS), tuple(Sensor)),
+    Layout.EUROC: (Sensor.MONOCULAR, Sensor.STEREO, Sensor.RIG),
+    **dict.fromkeys(map(Layout, BAG_LAYOUTS), (Sensor.MONOCULAR, Sensor.STEREO, Sensor.RGBD)),
 }
 
 
@@ -111,6 +111,8 @@ def write_sequence(
     progress: Progress | None = None,
 ) -> Path:
     """Write a sequence; see `SyntheticSequence.write`."""
+    if sequence.sensor is Sensor.RIG and layout is None:
+        layout = Layout.EUROC
     if layout is None and sequence.options.imu and sequence.sensor is not Sensor.RGBD:
         layout = Layout.EUROC
     chosen = choose_layout(layout, sequence.sensor)
@@ -139,6 +141,8 @@ def write_sequence(
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
         if not sequence.options.imu:  # as before there were any
             del about["imu"], about["imu_noise"]
+        if about.pop("rig") is not None:
+            about["rig"] = sequence.default_settings().to_yaml()
         if about.pop("lens_pair") is not None:
             about["lens_pair"] = sequence.default_settings().to_yaml()
         about[_ENTRIES] = {entry.name: _n_files(entry) for entry in sorted(temporary.iterdir())}
@@ -223,12 +227,15 @@ def _write_kitti(sequence: WritableSequence, folder: Path, progress: Progress) -
 
 def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -> None:
     top = folder / "mav0"
+    if sequence.sensor is Sensor.RIG:
+        _write_rig(sequence, top, progress)
+        _write_euroc_truth(sequence, top)
+        return
     cameras = [top / "cam0", top / "cam1"][: 1 + (sequence.sensor is Sensor.STEREO)]
     for number, camera in enumerate(cameras):
         (camera / "data").mkdir(parents=True)
         _write_text(camera / "sensor.yaml", _sensor_yaml(sequence, number))
-    # Names of equal length sort by time.
-    stamps = [f"{nanoseconds:019d}" for nanoseconds in sequence.nanoseconds]
+    stamps = _stamps(sequence)
     for i, stamp in enumerate(stamps):
         images = sequence.load(i)
         for camera, image in zip(cameras, (images.image, images.right), strict=False):
@@ -238,6 +245,32 @@ def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -
     for camera in cameras:
         rows = [f"{stamp},{stamp}.png" for stamp in stamps]
         _write_text(camera / "data.csv", ["#timestamp [ns],filename", *rows])
+    _write_euroc_truth(sequence, top)
+
+
+def _write_rig(sequence: WritableSequence, top: Path, progress: Progress) -> None:
+    """Images of all cameras in cam0, cam1, ... and depth images in depth0, ..."""
+    stamps = _stamps(sequence)
+    for i, stamp in enumerate(stamps):
+        for number, images in enumerate(sequence.load(i).cameras or ()):
+            kinds = ("cam", "depth") if isinstance(images, tuple) else ("cam",)
+            each = images if isinstance(images, tuple) else (images,)
+            for kind, image in zip(kinds, each, strict=True):
+                folder = top / f"{kind}{number}" / "data"
+                folder.mkdir(parents=True, exist_ok=True)
+                _write_image(folder / f"{stamp}.png", image)
+        progress(i + 1, len(sequence))
+    # Says where the body of the ground truth is: in the first camera.
+    _write_text(top / "cam0" / "sensor.yaml", _sensor_yaml(sequence, 0))
+
+
+def _stamps(sequence: WritableSequence) -> list[str]:
+    # Names of equal length sort by time.
+    return [f"{nanoseconds:019d}" for nanoseconds in sequence.nanoseconds]
+
+
+def _write_euroc_truth(sequence: WritableSequence, top: Path) -> None:
+    stamps = _stamps(sequence)
     T_wc = _upright(sequence.ground_truth().T_wc)
     lines = [
         "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], "
@@ -245,9 +278,9 @@ def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -
     ]
     for stamp, T, q in zip(stamps, T_wc, quaternions_from_rotations(T_wc[:, :3, :3]), strict=True):
         lines.append(f"{stamp},{_numbers([*T[:3, 3], q[3], *q[:3]], ',')}")
-    if sequence.options.lens_pair is not None:
+    if sequence.options.lens_pair is not None or sequence.options.rig is not None:
         # sensor.yaml does not know all lenses, nor what belongs to the sensor alone.
-        sequence.default_settings().save(folder / "settings.yaml")
+        sequence.default_settings().save(top.parent / "settings.yaml")
     truth = top / "state_groundtruth_estimate0"
     truth.mkdir()
     _write_text(truth / "data.csv", lines)
@@ -285,6 +318,8 @@ def _sensor_yaml(sequence: WritableSequence, number: int) -> list[str]:
     T_BS[0, 3] = sequence.baseline * number
     if sequence.options.lens_pair is not None:
         T_BS = lens_pair_of(sequence.options.lens_pair).T_tracked_raw[number]
+        comment = "the lens is in settings.yaml"
+    if sequence.options.rig is not None:
         comment = "the lens is in settings.yaml"
     return [
         "%YAML:1.0",

@@ -96,6 +96,9 @@ class SyntheticOptions:
     lens_pair
         Stereo settings of a raw pair, through whose two lenses the images are seen: with a
         rectification, or with the right camera of a fisheye pair. The images are raw.
+    rig
+        Settings of a rig, through whose lenses the images of all its cameras are seen (sensor rig).
+        A hand (`cover`) covers its first camera alone.
 
     Raises
     ------
@@ -130,6 +133,7 @@ class SyntheticOptions:
     imu: bool = False
     imu_noise: str | None = None
     lens_pair: Settings | None = None
+    rig: Settings | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -144,6 +148,7 @@ class SyntheticOptions:
         if self.size is not None:
             _check_size(self.size)
         self._check_lens()
+        self._check_rig()
         seed_of(self.seed, most=2**31 - 1)
         _check_range("noise", self.noise, 0, 100)
         _check_exposure(self.exposure)
@@ -176,6 +181,21 @@ class SyntheticOptions:
             raise SettingsError(
                 f"length does not apply to the {self.world}, whose size is fixed; take the street"
             )
+
+    def _check_rig(self) -> None:
+        if (self.sensor is Sensor.RIG) != (self.rig is not None):
+            raise SettingsError(
+                "a rig needs the sensor rig and settings of its cameras (--rig FILE); give both, "
+                "or neither"
+            )
+        if self.rig is None:
+            return
+        if not isinstance(self.rig, Settings) or self.rig.rig is None:
+            raise SettingsError(f"rig is {shown(self.rig)}; give Settings of the sensor rig")
+        given = {"size": self.size, "lens": self.lens, "lens_pair": self.lens_pair}
+        for name, value in (given | {"blur": self.blur, "imu": self.imu}).items():
+            if value:
+                raise SettingsError(f"a rig (--rig) goes without {name}; leave it out")
 
     def _check_lens(self) -> None:
         if self.lens_pair is not None:

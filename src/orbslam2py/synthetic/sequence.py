@@ -27,7 +27,14 @@ from orbslam2py._arguments import index_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.datasets import FramesInOrder, Images, Layout
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
+from orbslam2py.settings import (
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    RigCamera,
+    Sensor,
+    Settings,
+)
 from orbslam2py.synthetic import lens
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.imu import SyntheticImu
@@ -87,6 +94,8 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
             return seen_through.width or 0, seen_through.height or 0
         if self._lens_pair is not None:
             return self._lens_pair.models[0].image_size
+        if self._rig:
+            return self._rig[0].size
         return self.options.size or ((1241, 376) if self._scene.outdoors else (640, 480))
 
     def _frames_of_whole_way(self) -> int:
@@ -128,6 +137,8 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
     @property
     def camera(self) -> CameraSettings:
         """The camera; both cameras of a pair are alike, if they are not given."""
+        if self.options.rig is not None:
+            return replace(self.options.rig.camera, fps=self._fps)
         if self.options.lens_pair is not None:
             return replace(self.options.lens_pair.camera, fps=self._fps)
         width, height = self._size
@@ -154,6 +165,13 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
 
     def default_settings(self) -> Settings:
         """Return settings with the exact calibration."""
+        if self.options.rig is not None:
+            # Frames per second are common to all cameras.
+            rig = tuple(
+                replace(member, camera=replace(member.camera, fps=self._fps))
+                for member in self._rig
+            )
+            return replace(self.options.rig, rig=rig)
         if self.options.lens_pair is not None:
             return replace(self.options.lens_pair, camera=self.camera)
         depth = None
@@ -193,12 +211,39 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
             If there is no such frame.
         """
         T_wc = self.T_wc(index)
+        if self._rig:
+            return self._images_of_rig(T_wc, index)
         left, depth = self._seen(T_wc, index, right=False)
         if self.sensor is Sensor.STEREO:
             return Images(left, right=self._seen(T_wc, index, right=True)[0])
         if self.sensor is Sensor.RGBD:
             return Images(left, depth=self._measured(depth, index))
         return Images(left)
+
+    @property
+    def _rig(self) -> tuple[RigCamera, ...]:
+        rig = self.options.rig
+        return () if rig is None or rig.rig is None else rig.rig
+
+    def _images_of_rig(self, T_wc: FloatArray, index: int) -> Images:
+        """Render the images of all cameras; only the first one can be covered."""
+        seconds, exposure = (
+            self._seconds_on_way(index),
+            self._exposure(float(self.timestamps[index])),
+        )
+        factor = self.default_settings().depth_factor
+        cameras: list[Any] = []
+        for k, (member, view) in enumerate(zip(self._rig, self._wide_views, strict=True)):
+            number = len(self._rig) * index + k
+            side = functools.partial(self._side, T_wc @ member.T_body_camera, seconds)
+            image, depth = view.render(side)
+            seed = [self.options.seed, number]
+            grey = lens.exposed(image, exposure, self.options.noise, seed)
+            rows = self._hand_rows(index) if k == 0 or self._arrangement.dark[index] else 0
+            grey, depth = lens.covered(grey, depth, min(rows, grey.shape[0]))
+            cameras.append((grey, self._measured(depth, number, factor)) if member.depth else grey)
+        first = cameras[0][0] if self._rig[0].depth else cameras[0]
+        return Images(first, cameras=tuple(cameras))
 
     # ---- what only a made-up world knows ---------------------------------------------------------
     @property
@@ -417,6 +462,8 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         if self._lens_pair is not None:
             left, right = self._lens_pair.models
             return WideView(left), WideView(right)
+        if self._rig:
+            return tuple(WideView(m.camera.camera_model(*m.size)) for m in self._rig)
         seen_through = self.options.lens
         return () if seen_through is None else (WideView(seen_through.camera_model(*self._size)),)
 
@@ -461,10 +508,12 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         grey, depth = core.render(world, inverse_poses(T_wc), **image, threads=self._threads)
         return grey, depth
 
-    def _measured(self, depth: NDArray[np.float32], number: int) -> NDArray[np.uint16]:
+    def _measured(
+        self, depth: NDArray[np.float32], number: int, raw_per_metre: float = DEPTH_PER_METRE
+    ) -> NDArray[np.uint16]:
         metres = depth.astype(np.float64)
         if self.options.depth_noise > 0:
             random = np.random.default_rng([self.options.seed, number])
             metres += self.options.depth_noise * metres**2 * random.standard_normal(depth.shape)
-        raw = np.rint(metres * DEPTH_PER_METRE)
+        raw = np.rint(metres * raw_per_metre)
         return np.where((raw > 0) & (raw < 2**16), raw, 0).astype(np.uint16)

@@ -276,7 +276,7 @@ TEST_P(EachLens, ASightGivesTheErrorInRawPixels) {
         ASSERT_TRUE(camera_->project(p, pixel));
         ASSERT_TRUE(camera_->error(p, u, v, error));
         const Eigen::Vector2d exact = camera_->to_image(pixel) - raw;
-        const Eigen::Vector3d q = sight * p;
+        const Eigen::Vector3d q = apply(sight, p);
         EXPECT_GT(q.z(), 0);
         // The rest is of second order.
         EXPECT_NEAR((q.head<2>() / q.z() - exact).norm(), 0, 3e3 * turn * turn + 1e-9);

@@ -184,7 +184,7 @@ TEST(WidePair, SightsTellDisparityAndEpipolarDirection) {
                                    Eigen::Vector3d(1, 3, 0.5)}) {
     Eigen::Vector2d uv;
     ASSERT_TRUE(camera->project(p, uv));
-    const Sight B = camera->sight(uv.x(), uv.y());
+    const Eigen::Matrix3d B = camera->sight(uv.x(), uv.y()).leftCols<3>();
     EXPECT_NEAR((B * p).head<2>().norm(), 0, 1e-8);
     EXPECT_NEAR(camera->bf() / B.row(2).dot(p), camera->disparity(p), 1e-9);
     EXPECT_NEAR(camera->disparity(uv.x(), uv.y(), p.norm()), camera->disparity(p), 1e-9);

@@ -36,7 +36,7 @@ def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
 def written_as_version(version: int, folder: Path) -> Path:
     """The small map as an earlier version of the format had it.
 
-    Version 3 had no fisheye lenses, version 2 no rational ones; version 1 had no words, and a short
+    Version 4 had no rigs, version 3 no fisheye lenses, version 2 no rational ones; version 1 had no words, and a short
     hash of the vocabulary.
     """
     path = folder / f"version_{version}.orbmap"
@@ -46,7 +46,8 @@ def written_as_version(version: int, folder: Path) -> Path:
         for name, present in all_rows(small_map()):
             row = present[:-1] if name == "keypoints" and version < 2 else present
             if name == "cameras":
-                row = present[:-2] if version == 3 else (*present[:10], *present[13:-2])
+                without = present[: -1 if version == 4 else -3]
+                row = without if version >= 3 else (*without[:10], *without[13:])
             if name == "vocabulary" and version < 2:
                 row = (1, "", f"{load_vocabulary().hash:016x}", "")
             sums[name].append(checksum(row))

@@ -28,7 +28,11 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
     words = saved.vocabulary
     yield "file", f"{file} ({file.stat().st_size / 1e6:.2f} MB)"
     size = f", {contents.cameras.width[0]} x {contents.cameras.height[0]}"
-    yield "camera", f"{saved.sensor}{size}, fx {camera.fx:g}"
+    if settings.rig is not None:
+        sizes = ", ".join("{} x {}".format(*member.size) for member in settings.rig)
+        yield "cameras", f"rig of {len(settings.rig)}: {sizes}"
+    else:
+        yield "camera", f"{saved.sensor}{size}, fx {camera.fx:g}"
     yield "vocabulary", f"{words.hash}{f' ({words.name})' if words.name else ''}"
     numbers = map_numbers(keyframes)
     if numbers.max() > 0:

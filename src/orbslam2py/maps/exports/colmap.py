@@ -22,7 +22,7 @@ from orbslam2py.maps.exports.colmap_model import (
     ColmapPoints,
     colmap_model,
 )
-from orbslam2py.maps.exports.folder import export_folder, write_images
+from orbslam2py.maps.exports.folder import export_folder, refuse_rig, write_images
 from orbslam2py.maps.exports.images import ImageOfKeyframe, Progress, View, views_without_images
 
 
@@ -89,6 +89,7 @@ def export_colmap(
     >>> export_colmap(contents, "desk", images=images_of(contents, sequence))  # doctest: +SKIP
     """
     contents_of(contents)
+    refuse_rig(contents, "A COLMAP model")
     with export_folder(folder, {"sparse", "images"}, replace=replace) as made:
         if images is None:
             views = views_without_images(contents, image_names)

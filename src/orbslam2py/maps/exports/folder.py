@@ -14,7 +14,7 @@ import numpy as np
 from orbslam2py._arguments import path_of
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import atomic_folder, atomic_write, failing_as
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, MapFileError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.exports.colours import ColourSampler
 from orbslam2py.maps.exports.images import (
@@ -146,6 +146,15 @@ def write_images(
             "images out"
         )
     return views, sampler.coloured()
+
+
+def refuse_rig(contents: MapContents, what: str) -> None:
+    """Raise `MapFileError` for a map of a rig, whose keyframes have several images."""
+    if contents.cameras.has_rigs:
+        raise MapFileError(
+            f"{what} cannot be made of the map of a rig yet: its keyframes have several images. "
+            "Points (ply, pcd), poses of the body (tum, kitti) and g2o can be exported"
+        )
 
 
 class _PinholesOfFisheyes:

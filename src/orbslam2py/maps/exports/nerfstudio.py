@@ -15,7 +15,7 @@ from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError, MapFileError
 from orbslam2py.maps.content_groups import Cameras
 from orbslam2py.maps.contents import MapContents, contents_of
-from orbslam2py.maps.exports.folder import export_folder, write_images
+from orbslam2py.maps.exports.folder import export_folder, refuse_rig, write_images
 from orbslam2py.maps.exports.images import (
     ImageOfKeyframe,
     Progress,
@@ -91,6 +91,7 @@ def export_nerfstudio(
     """
     if not len(contents_of(contents).keyframes):
         raise MapFileError("the map has no keyframes, and nerfstudio takes no empty data; map more")
+    refuse_rig(contents, "nerfstudio")
     with export_folder(folder, {"transforms.json", _POINTS, "images"}, replace=replace) as made:
         if images is None:
             views = views_without_images(contents, image_names)
