@@ -277,18 +277,19 @@ void bind_start(py::module_& module) {
       .def_property_readonly(
           "up", [](const S& s) { return Pose(s.up, Eigen::Vector3d::Zero()); },
           "Pose that turns gravity to (0, 0, -9.81).");
-  module.def("estimate_inertial_start", &start_of, "times"_a, "T_wc"_a, "samples"_a, "T_cb"_a,
-             "noise"_a, py::kw_only(), "metric"_a, "rotation_deviation"_a, "position_deviation"_a,
-             "bias"_a = Vector6d(Vector6d::Zero()), "gyro_deviation"_a = 0.1,
-             "accel_deviation"_a = 0.2, "known_gravity"_a = 0.0, "known_scale"_a = 0.0,
-             "Gravity, scale, biases and velocities from poses of the camera in a map and the "
-             "samples between them (Campos et al., ICRA 2020).\n\n"
-             "times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of "
-             "InertialFilter. metric: the unit of the map is the metre. Deviations of the views' "
-             "rotations [rad] and positions [units of the map]; bias (6,) with the deviations of "
-             "gyro [rad/s] and accelerometer [m/s^2]: what is known before. known_gravity [rad] and "
-             "known_scale: deviations of the third axis and of the logarithm of the scale in a map "
-             "that an IMU has turned upright before; 0: nothing is known. Raises ValueError.");
+  module.def(
+      "estimate_inertial_start", &start_of, "times"_a, "T_wc"_a, "samples"_a, "T_cb"_a, "noise"_a,
+      py::kw_only(), "metric"_a, "rotation_deviation"_a, "position_deviation"_a,
+      "bias"_a = Vector6d(Vector6d::Zero()), "gyro_deviation"_a = 0.1, "accel_deviation"_a = 0.2,
+      "known_gravity"_a = 0.0, "known_scale"_a = 0.0,
+      "Gravity, scale, biases and velocities from poses of the camera in a map and the "
+      "samples between them (Campos et al., ICRA 2020).\n\n"
+      "times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of "
+      "InertialFilter. metric: the unit of the map is the metre. Deviations of the views' "
+      "rotations [rad] and positions [units of the map]; bias (6,) with the deviations of "
+      "gyro [rad/s] and accelerometer [m/s^2]: what is known before. known_gravity [rad] and "
+      "known_scale: deviations of the third axis and of the logarithm of the scale in a map "
+      "that an IMU has turned upright before; 0: nothing is known. Raises ValueError.");
 }
 
 }  // namespace

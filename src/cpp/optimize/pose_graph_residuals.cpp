@@ -62,8 +62,9 @@ void write(const TangentMap& map, const PoseGraphView& view, double sign, double
 
 void PoseGraphView::move(const double* parameters, int n_parameters) {
   const bool upright = n_parameters == 4;
-  const Eigen::Vector3d w =
-      upright ? parameters[0] * up_ : Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(parameters));
+  const Eigen::Vector3d w = upright
+                                ? parameters[0] * up_
+                                : Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(parameters));
   const Eigen::Map<const Eigen::Vector3d> v(parameters + (upright ? 1 : 3));
   const double log_scale = n_parameters == 7 ? parameters[6] : 0.0;
   valid_ = w.allFinite() && v.allFinite() && std::abs(log_scale) < kMaxLogScale;

@@ -25,8 +25,8 @@ class PoseGraphView {
   explicit PoseGraphView(const Similarity& S_iw)
       : start_(S_iw), S_iw_(S_iw), up_(S_iw.rotation() * Eigen::Vector3d::UnitZ()) {}
 
-  /// Moves to the given four, six or seven parameters, unless they are not finite or the logarithm of
-  /// the scale gets out of hand: then the view is not valid and stays where it was.
+  /// Moves to the given four, six or seven parameters, unless they are not finite or the logarithm
+  /// of the scale gets out of hand: then the view is not valid and stays where it was.
   void move(const double* parameters, int n_parameters);
   bool valid() const { return valid_; }
 
@@ -49,7 +49,8 @@ Vector7d pose_graph_residual(const Similarity& S_ji, const Similarity& S_iw,
                              const Similarity& S_jw);
 
 /// The residual of an edge; its blocks are the parameters of view i and of view j, kParameters of
-/// each: 7, 6 with scales kept, or 4 with roll and pitch kept as well. The views must have moved to them before.
+/// each: 7, 6 with scales kept, or 4 with roll and pitch kept as well. The views must have moved to
+/// them before.
 template <int kParameters>
 class PoseGraphResidual final : public ceres::SizedCostFunction<7, kParameters, kParameters> {
  public:

@@ -111,7 +111,9 @@ void LocalMapping::process(KeyFrameId keyframe) {
   if (worker.lower_interrupt()) {
     local_bundle_adjustment(map_, keyframe, &worker.interrupt_flag.value(), false,
                             kAdjustmentThreads, BundleOptions().solver, inertial_.get());
-    const auto is_needed = [&](KeyFrameId id) { return inertial_ && inertial_->is_needed(map_, id); };
+    const auto is_needed = [&](KeyFrameId id) {
+      return inertial_ && inertial_->is_needed(map_, id);
+    };
     for (const KeyFrameId dead : cull_keyframes(map_, keyframe, true, is_needed)) {
       index_.erase(dead);
     }

@@ -90,8 +90,8 @@ TEST(InertialStart, KeepsWhatIsKnownOfAMap) {
     options.rotation_deviation = 1e-3;
     options.position_deviation = 2e-3;
     options.known_gravity = options.known_scale = 0.01;
-    const InertialStart start = estimate_inertial_start(all.views, all.samples, testing::kT_cb,
-                                                        testing::kNoise, options);
+    const InertialStart start =
+        estimate_inertial_start(all.views, all.samples, testing::kT_cb, testing::kNoise, options);
     ASSERT_TRUE(start.solved);
     EXPECT_LT(start.gravity_deviation, 0.0101);
     EXPECT_LT(start.scale_deviation, 0.0101);

@@ -38,8 +38,9 @@ void roll_loop(RingScene& scene, double angle) {
 }
 
 TEST(UprightCorrection, KeepsThePlaceAndTheNearestYaw) {
-  const Pose T_cw(Eigen::Quaterniond(Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized())),
-                  Eigen::Vector3d(0.3, -2, 1));
+  const Pose T_cw(
+      Eigen::Quaterniond(Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized())),
+      Eigen::Vector3d(0.3, -2, 1));
   const Eigen::Quaterniond yaw(Eigen::AngleAxisd(2.5, Eigen::Vector3d::UnitZ()));
   const Eigen::Vector3d tilt_axis(0.6, 0.8, 0);
   for (const double tilt : {0.0, 0.03, 0.06}) {
