@@ -83,7 +83,7 @@ class Rings:
 def join(slam_map: core.Map, loop: core.Loop, timer: StageTimer) -> None:
     """Make one map of two, as the system does once it believes the place."""
     merging = MapMerging(
-        slam_map, lambda *_: None, lambda _: [], fix_scale=True, config=MergingConfig()
+        slam_map, lambda *_: None, lambda _: [], fixes_scale=lambda *_: True, config=MergingConfig()
     )
     if merging.join(loop, timer, core.StopFlag()) is None:
         raise RuntimeError("the maps were not joined")

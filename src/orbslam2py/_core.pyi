@@ -683,6 +683,10 @@ class InertialFilter:
         """
         T_cb: Pose from the IMU to the camera. noise: (4,), densities of gyro and accelerometer, and of the walks of their biases, in the units of `Preintegration`. T_wb, velocity (3,), bias (6,), covariance (18, 18): the state at first.
         """
+    def anchor(self) -> None:
+        """
+        The map continues from the present pose, which has no error there by definition.
+        """
     def distance(self, T_cw: Pose, covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"]) -> float:
         """
         Squared Mahalanobis distance of a pose with this covariance: 6 degrees of freedom.
@@ -699,9 +703,9 @@ class InertialFilter:
         """
         Pose `T_cw` of the camera and its covariance (6, 6): rotation, translation; left perturbation.
         """
-    def predict(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], scale_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def predict(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], scale_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0, rotation_walk: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
-        From the first sample (n, 7) to the last. scale_walk: random walk of the logarithm of the scale [1/sqrt(s)]. Raises ValueError as Preintegration does.
+        From the first sample (n, 7) to the last. Random walks for the drift of a growing map: of the logarithm of the scale [1/sqrt(s)], and of the map's axes [rad/sqrt(s)]. Raises ValueError as Preintegration does.
         """
     def transform(self, scale: typing.SupportsFloat | typing.SupportsIndex, pose: Pose) -> None:
         """
@@ -3707,9 +3711,11 @@ def create_new_points(map: Map, current: int, options: NewPointOptions, should_s
     `should_stop`: a StopFlag read between neighbours, or None. Returns the new points' ids,
     (n,) int64.
     """
-def cull_keyframes(map: Map, current: int, only_close: bool) -> numpy.typing.NDArray[numpy.int64]:
+def cull_keyframes(map: Map, current: int, only_close: bool, inertial: InertialKeyframes | None = None) -> numpy.typing.NDArray[numpy.int64]:
     """
     Remove redundant neighbours of a keyframe; those that died: (n,) int64.
+
+    `inertial`: InertialKeyframes, whose chain in time keeps no long gaps; or None.
     """
 def cull_recent_points(map: Map, current: int, min_observations: typing.SupportsInt | typing.SupportsIndex, recent: RecentPoints) -> int:
     """
@@ -3731,11 +3737,11 @@ def discard_temporary(frame: TrackedFrame) -> int:
     """
     Drop the frame's associations with temporary points; their number.
     """
-def estimate_inertial_start(times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], T_wc: collections.abc.Sequence[Pose], samples: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], *, metric: bool, rotation_deviation: typing.SupportsFloat | typing.SupportsIndex, position_deviation: typing.SupportsFloat | typing.SupportsIndex, bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"] = ..., gyro_deviation: typing.SupportsFloat | typing.SupportsIndex = 0.1, accel_deviation: typing.SupportsFloat | typing.SupportsIndex = 0.2) -> InertialStart:
+def estimate_inertial_start(times: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], T_wc: collections.abc.Sequence[Pose], samples: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64]], T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], *, metric: bool, rotation_deviation: typing.SupportsFloat | typing.SupportsIndex, position_deviation: typing.SupportsFloat | typing.SupportsIndex, bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"] = ..., gyro_deviation: typing.SupportsFloat | typing.SupportsIndex = 0.1, accel_deviation: typing.SupportsFloat | typing.SupportsIndex = 0.2, known_gravity: typing.SupportsFloat | typing.SupportsIndex = 0.0, known_scale: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> InertialStart:
     """
     Gravity, scale, biases and velocities from poses of the camera in a map and the samples between them (Campos et al., ICRA 2020).
 
-    times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of InertialFilter. metric: the unit of the map is the metre. Deviations of the views' rotations [rad] and positions [units of the map]; bias (6,) with the deviations of gyro [rad/s] and accelerometer [m/s^2]: what is known before. Raises ValueError.
+    times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of InertialFilter. metric: the unit of the map is the metre. Deviations of the views' rotations [rad] and positions [units of the map]; bias (6,) with the deviations of gyro [rad/s] and accelerometer [m/s^2]: what is known before. known_gravity [rad] and known_scale: deviations of the third axis and of the logarithm of the scale in a map that an IMU has turned upright before; 0: nothing is known. Raises ValueError.
     """
 def figure_eight_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """

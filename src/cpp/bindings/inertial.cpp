@@ -182,12 +182,13 @@ void bind_filter(py::module_& module) {
            "T_wb, velocity (3,), bias (6,), covariance (18, 18): the state at first.")
       .def(
           "predict",
-          [](F& f, const Input<double>& samples, double scale_walk) {
-            f.predict(imu_samples_of(samples), scale_walk);
+          [](F& f, const Input<double>& samples, double scale_walk, double rotation_walk) {
+            f.predict(imu_samples_of(samples), scale_walk, rotation_walk);
           },
-          "samples"_a, "scale_walk"_a = 0.0,
-          "From the first sample (n, 7) to the last. scale_walk: random walk of the logarithm of "
-          "the scale [1/sqrt(s)]. Raises ValueError as Preintegration does.")
+          "samples"_a, "scale_walk"_a = 0.0, "rotation_walk"_a = 0.0,
+          "From the first sample (n, 7) to the last. Random walks for the drift of a growing map: "
+          "of the logarithm of the scale [1/sqrt(s)], and of the map's axes [rad/sqrt(s)]. Raises "
+          "ValueError as Preintegration does.")
       .def(
           "pose",
           [](const F& f) {
@@ -205,6 +206,8 @@ void bind_filter(py::module_& module) {
            "Squared Mahalanobis distance of a pose with this covariance: 6 degrees of freedom.")
       .def("move", &F::move, "T_cw"_a,
            "The map was moved: the camera's pose is this one now; the velocity turns with it.")
+      .def("anchor", &F::anchor,
+           "The map continues from the present pose, which has no error there by definition.")
       .def(
           "transform",
           [](F& f, double scale, const Pose& pose) {
@@ -232,7 +235,7 @@ InertialStart start_of(const std::vector<double>& times, const std::vector<Pose>
                        const std::vector<Input<double>>& samples, const Pose& T_cb,
                        const Eigen::Vector4d& noise, bool metric, double rotation_deviation,
                        double position_deviation, const Vector6d& bias, double gyro_deviation,
-                       double accel_deviation) {
+                       double accel_deviation, double known_gravity, double known_scale) {
   if (times.size() != T_wc.size()) throw py::value_error("as many times as poses are needed");
   std::vector<InertialView> views;
   for (std::size_t i = 0; i < times.size(); ++i) views.push_back({times[i], T_wc[i]});
@@ -245,6 +248,8 @@ InertialStart start_of(const std::vector<double>& times, const std::vector<Pose>
   options.bias = bias_of(bias);
   options.gyro_deviation = gyro_deviation;
   options.accel_deviation = accel_deviation;
+  options.known_gravity = known_gravity;
+  options.known_scale = known_scale;
   const py::gil_scoped_release release;
   return estimate_inertial_start(views, between, T_cb, noise_of(noise), options);
 }
@@ -272,16 +277,19 @@ void bind_start(py::module_& module) {
       .def_property_readonly(
           "up", [](const S& s) { return Pose(s.up, Eigen::Vector3d::Zero()); },
           "Pose that turns gravity to (0, 0, -9.81).");
-  module.def("estimate_inertial_start", &start_of, "times"_a, "T_wc"_a, "samples"_a, "T_cb"_a,
-             "noise"_a, py::kw_only(), "metric"_a, "rotation_deviation"_a, "position_deviation"_a,
-             "bias"_a = Vector6d(Vector6d::Zero()), "gyro_deviation"_a = 0.1,
-             "accel_deviation"_a = 0.2,
-             "Gravity, scale, biases and velocities from poses of the camera in a map and the "
-             "samples between them (Campos et al., ICRA 2020).\n\n"
-             "times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of "
-             "InertialFilter. metric: the unit of the map is the metre. Deviations of the views' "
-             "rotations [rad] and positions [units of the map]; bias (6,) with the deviations of "
-             "gyro [rad/s] and accelerometer [m/s^2]: what is known before. Raises ValueError.");
+  module.def(
+      "estimate_inertial_start", &start_of, "times"_a, "T_wc"_a, "samples"_a, "T_cb"_a, "noise"_a,
+      py::kw_only(), "metric"_a, "rotation_deviation"_a, "position_deviation"_a,
+      "bias"_a = Vector6d(Vector6d::Zero()), "gyro_deviation"_a = 0.1, "accel_deviation"_a = 0.2,
+      "known_gravity"_a = 0.0, "known_scale"_a = 0.0,
+      "Gravity, scale, biases and velocities from poses of the camera in a map and the "
+      "samples between them (Campos et al., ICRA 2020).\n\n"
+      "times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of "
+      "InertialFilter. metric: the unit of the map is the metre. Deviations of the views' "
+      "rotations [rad] and positions [units of the map]; bias (6,) with the deviations of "
+      "gyro [rad/s] and accelerometer [m/s^2]: what is known before. known_gravity [rad] and "
+      "known_scale: deviations of the third axis and of the logarithm of the scale in a map "
+      "that an IMU has turned upright before; 0: nothing is known. Raises ValueError.");
 }
 
 }  // namespace

@@ -426,18 +426,6 @@ void bind_keyframe_verbs(py::module_& module) {
       },
       "map"_a, "current"_a, "min_observations"_a, "recent"_a, Release(),
       "Remove recent points that are rarely found; the number of points killed.");
-  module.def(
-      "cull_keyframes",
-      [](Map& map, KeyFrameId current, bool only_close) {
-        std::vector<KeyFrameId> died;
-        {
-          const py::gil_scoped_release release;
-          died = cull_keyframes(map, current, only_close);
-        }
-        return to_array(died);
-      },
-      "map"_a, "current"_a, "only_close"_a,
-      "Remove redundant neighbours of a keyframe; those that died: (n,) int64.");
   module.def("check_invariants", &check_invariants, "map"_a, "require_words"_a, Release(),
              "One sentence per violated invariant; empty for a consistent map.");
 }

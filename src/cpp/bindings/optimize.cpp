@@ -9,6 +9,7 @@
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 #include "bindings/stop_flag.hpp"
+#include "map/culling.hpp"
 #include "optimize/bundle_adjustment.hpp"
 #include "optimize/frame_sightings.hpp"
 #include "optimize/full_bundle_adjustment.hpp"
@@ -290,8 +291,27 @@ void bind_inertial_keyframes(py::module_& module) {
       .def("clear", &K::clear, "Forget everything.");
 }
 
+void bind_culling(py::module_& module) {
+  module.def(
+      "cull_keyframes",
+      [](Map& map, KeyFrameId current, bool only_close, const InertialKeyframes* inertial) {
+        std::vector<KeyFrameId> died;
+        {
+          const py::gil_scoped_release release;
+          died = cull_keyframes(map, current, only_close, [&](KeyFrameId id) {
+            return inertial != nullptr && inertial->is_needed(map, id);
+          });
+        }
+        return to_array(died);
+      },
+      "map"_a, "current"_a, "only_close"_a, "inertial"_a = py::none(),
+      "Remove redundant neighbours of a keyframe; those that died: (n,) int64.\n\n"
+      "`inertial`: InertialKeyframes, whose chain in time keeps no long gaps; or None.");
+}
+
 void bind_local_bundle(py::module_& module) {
   bind_inertial_keyframes(module);
+  bind_culling(module);
   py::class_<LocalBundleResult>(module, "LocalBundleResult", "What local_bundle_adjustment did.")
       .def_readonly("n_local_keyframes", &LocalBundleResult::n_local_keyframes,
                     "The keyframe and its neighbours.")

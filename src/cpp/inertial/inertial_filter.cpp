@@ -9,15 +9,6 @@
 namespace orbslam {
 namespace {
 
-/// The transform of tangents (rotation, translation) by a pose.
-Matrix6d adjoint(const Pose& T) {
-  const Eigen::Matrix3d R = T.rotation_matrix();
-  Matrix6d Ad = Matrix6d::Zero();
-  Ad.topLeftCorner<3, 3>() = Ad.bottomRightCorner<3, 3>() = R;
-  Ad.bottomLeftCorner<3, 3>() = skew(T.translation()) * R;
-  return Ad;
-}
-
 template <class Matrix>
 void make_symmetric(Matrix& m) {
   m = (0.5 * (m + m.transpose())).eval();
@@ -38,7 +29,8 @@ Eigen::Vector3d InertialFilter::gravity() const {
   return so3_exp({tilt_.x(), tilt_.y(), 0}) * Eigen::Vector3d(0, 0, -kGravity);
 }
 
-void InertialFilter::predict(const std::vector<ImuSample>& samples, double scale_walk) {
+void InertialFilter::predict(const std::vector<ImuSample>& samples, double scale_walk,
+                             double rotation_walk) {
   const Preintegration motion(samples, noise_, bias_);
   const double dt = motion.duration(), factor = std::exp(log_scale_);
   const Eigen::Matrix3d R = state_.T_wb.rotation_matrix();
@@ -71,6 +63,7 @@ void InertialFilter::predict(const std::vector<ImuSample>& samples, double scale
   covariance_.topLeftCorner<9, 9>() += noise;
   covariance_.block<6, 6>(kGyro, kGyro) += motion.bias_walk_covariance();
   covariance_(kScale, kScale) += scale_walk * scale_walk * dt;
+  covariance_.diagonal().segment<3>(kRotation).array() += rotation_walk * rotation_walk * dt;
   make_symmetric(covariance_);
 
   const Eigen::Vector3d position = state_.T_wb.translation() + dt * state_.velocity + further;
@@ -164,6 +157,17 @@ void InertialFilter::move(const Pose& T_cw) {
   covariance_ = (A * covariance_ * A.transpose()).eval();
   state_.T_wb = T_wb;
   state_.velocity = R * state_.velocity;
+}
+
+void InertialFilter::anchor() {
+  // The axes of the map turn by less the error of the rotation, seen in the world.
+  const Eigen::Matrix3d R = state_.T_wb.rotation_matrix();
+  Covariance A = Covariance::Identity();
+  A.block<3, 3>(kRotation, kRotation).setZero();
+  A.block<3, 3>(kPosition, kPosition).setZero();
+  A.block<3, 3>(kVelocity, kRotation) = skew(state_.velocity) * R;
+  A.block<2, 3>(kTilt, kRotation) = -R.topRows<2>();
+  covariance_ = (A * covariance_ * A.transpose()).eval();
 }
 
 void InertialFilter::transform(const Eigen::Quaterniond& rotation, double factor,

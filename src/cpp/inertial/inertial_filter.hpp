@@ -39,10 +39,11 @@ class InertialFilter {
   InertialFilter(const Pose& T_cb, const ImuNoise& noise, const ImuState& state,
                  const ImuBias& bias, const Covariance& covariance);
 
-  /// From the first sample to the last. `scale_walk`: random walk of the logarithm of the scale
-  /// [1/sqrt(s)], for the drift of the scale of a single camera's map. Throws
-  /// std::invalid_argument as Preintegration does.
-  void predict(const std::vector<ImuSample>& samples, double scale_walk = 0);
+  /// From the first sample to the last. Random walks for the drift of a growing map: `scale_walk`
+  /// of the logarithm of a single camera's scale [1/sqrt(s)], `rotation_walk` of the map's axes
+  /// [rad/sqrt(s)]. Throws std::invalid_argument as Preintegration does.
+  void predict(const std::vector<ImuSample>& samples, double scale_walk = 0,
+               double rotation_walk = 0);
 
   /// The pose of the camera.
   PoseGaussian pose() const;
@@ -58,6 +59,9 @@ class InertialFilter {
 
   /// The map was moved: the camera's pose is this one now, and velocity and errors turn with it.
   void move(const Pose& T_cw);
+  /// The map continues from the present pose, which has no error there by definition. What is known
+  /// of its error passes to velocity and gravity, whose axes are those of the body.
+  void anchor();
   /// The map was turned and scaled: `x' = factor * (rotation x) + shift`. The tilt and scale that
   /// it corrects are taken from the means: both are 0 afterwards, their deviations stay.
   void transform(const Eigen::Quaterniond& rotation, double factor, const Eigen::Vector3d& shift);

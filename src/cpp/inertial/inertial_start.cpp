@@ -110,6 +110,19 @@ class Problem {
     return true;
   }
 
+  /// The start from what is known of the map, instead of solve_linear().
+  void take_known() {
+    gravity_ = Eigen::Vector3d(0, 0, -kGravity);
+    linear_length_ = kGravity;
+    const std::size_t n = centres_.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t from = i == 0 ? 0 : i - 1, to = std::min(i + 1, n - 1);
+      double dt = 0;
+      for (std::size_t k = from; k < to; ++k) dt += motions_[k].duration();
+      velocities_[i] = (state(to).T_wb.translation() - state(from).T_wb.translation()) / dt;
+    }
+  }
+
   bool refine() {
     double cost = linearise();
     for (int iteration = 0; iteration < kIterations && std::isfinite(cost); ++iteration) {
@@ -144,6 +157,8 @@ class Problem {
     start.cost = cost_;
     start.freedom =
         static_cast<int>(9 * (n - 1) + 6 * n + 6 - (common + kCommon) + (options_.metric ? 1 : 0));
+    if (options_.known_gravity > 0) start.freedom += 2;
+    if (!options_.metric && options_.known_scale > 0) start.freedom += 1;
     start.up = turn_up(gravity_);
     start.scale_deviation =
         options_.metric ? 0 : std::sqrt(std::max(0.0, P(kView + kScaleAt, kView + kScaleAt)));
@@ -203,7 +218,7 @@ class Problem {
     cost += add_bias_prior(common + kAccelAt, bias_.accel - options_.bias.accel,
                            options_.accel_deviation);
     if (options_.metric) H_(common + kScaleAt, common + kScaleAt) += 1;
-    return cost;
+    return cost + add_map_prior(common, to_world);
   }
 
   /// From derivatives by (rotation, velocity, position) of the IMU to those of a view, whose
@@ -245,6 +260,26 @@ class Problem {
     b_.segment<3>(kView * i) -= turn * turned;
     b_.segment<3>(kView * i + 6) -= place * moved;
     return turn * turned.squaredNorm() + place * moved.squaredNorm();
+  }
+
+  /// Of gravity and scale in a map that they are known of.
+  double add_map_prior(Index common, const Eigen::Matrix3d& to_world) {
+    double cost = 0;
+    const auto add = [&](Index at, double off, double deviation) {
+      const double weight = 1 / (deviation * deviation);
+      H_(at, at) += weight;
+      b_(at) -= weight * off;
+      cost += weight * off * off;
+    };
+    if (options_.known_gravity > 0) {
+      const Eigen::Vector3d turn = Eigen::Vector3d(0, 0, -1).cross(gravity_ / kGravity);
+      const Eigen::Vector2d off = to_world.leftCols<2>().transpose() * turn;
+      for (Index a = 0; a < 2; ++a) add(common + kTiltAt + a, off(a), options_.known_gravity);
+    }
+    if (!options_.metric && options_.known_scale > 0) {
+      add(common + kScaleAt, std::log(scale_), options_.known_scale);
+    }
+    return cost;
   }
 
   double add_bias_prior(Index at, const Eigen::Vector3d& off, double deviation) {
@@ -297,7 +332,12 @@ InertialStart estimate_inertial_start(const std::vector<InertialView>& views,
   }
   Problem problem(views, samples, T_cb, noise, options);
   problem.estimate_gyro_bias();
-  if (!problem.solve_linear() || !problem.refine()) return {};
+  if (options.known_gravity > 0) {
+    problem.take_known();
+  } else if (!problem.solve_linear()) {
+    return {};
+  }
+  if (!problem.refine()) return {};
   return problem.result();
 }
 

@@ -20,6 +20,9 @@ struct InertialStartOptions {
   /// Mean and standard deviations of the biases before: rad/s, m/s^2.
   ImuBias bias;
   double gyro_deviation = 0.1, accel_deviation = 0.2;
+  /// Of a map that an IMU has turned upright and scaled before: standard deviations of the third
+  /// axis from the vertical [rad] and of the logarithm of the scale. 0: nothing is known.
+  double known_gravity = 0, known_scale = 0;
 };
 
 struct InertialStart {

@@ -3,8 +3,6 @@
 
 #include <cmath>
 
-#include "base/pose.hpp"
-
 namespace orbslam {
 
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& omega) {
@@ -31,6 +29,14 @@ Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& omega) {
   }
   const Eigen::Matrix3d cross = skew(omega);
   return Eigen::Matrix3d::Identity() - b * cross + c * cross * cross;
+}
+
+Matrix6d adjoint(const Pose& T) {
+  const Eigen::Matrix3d R = T.rotation_matrix();
+  Matrix6d Ad = Matrix6d::Zero();
+  Ad.topLeftCorner<3, 3>() = Ad.bottomRightCorner<3, 3>() = R;
+  Ad.bottomLeftCorner<3, 3>() = skew(T.translation()) * R;
+  return Ad;
 }
 
 }  // namespace orbslam

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "base/pose.hpp"
+
 namespace orbslam {
 
 /// The rotation of a rotation vector [rad], as a unit quaternion.
@@ -14,5 +16,8 @@ Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
 
 /// Right Jacobian Jr of the exponential map: exp(omega + d) = exp(omega) exp(Jr d) to first order.
 Eigen::Matrix3d so3_right_jacobian(const Eigen::Vector3d& omega);
+
+/// Adjoint of a pose, for tangents (rotation, translation): T exp(d) = exp(adjoint(T) d) T.
+Matrix6d adjoint(const Pose& T);
 
 }  // namespace orbslam

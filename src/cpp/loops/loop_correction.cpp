@@ -7,6 +7,7 @@
 #include "loops/essential_graph.hpp"
 #include "loops/fusion_draft.hpp"
 #include "loops/seam.hpp"
+#include "loops/upright.hpp"
 
 namespace orbslam {
 namespace {
@@ -32,6 +33,13 @@ LoopCorrection plan_loop_correction(const Map& map, const Loop& loop, bool fix_s
   std::optional<Seam> seam = draft_seam(map, loop, fix_scale);
   if (!seam || seam->near_map != seam->far_map) return correction;
   correction.epoch = seam->epoch;
+  if (is_upright(map, seam->near_map)) {
+    const auto turn = upright_correction(seam->draft.T_cw(0), seam->group.corrected.front());
+    correction.upright = turn.has_value();
+    if (turn) {
+      for (Similarity& corrected : seam->group.corrected) corrected = corrected * *turn;
+    }
+  }
   build_essential_graph(map, seam->group, correction);
   if (correction.keyframes.empty()) return correction;
   correction.fusions = seam->draft.take_fusions();
@@ -45,6 +53,7 @@ PoseGraphSummary optimize_essential_graph(LoopCorrection& correction,
   if (correction.keyframes.empty()) return {};
   PoseGraphOptions options;
   options.fix_scale = correction.fix_scale;
+  options.upright = correction.upright;
   options.n_threads = n_threads;
   return optimize_pose_graph(correction.graph, options, abort);
 }

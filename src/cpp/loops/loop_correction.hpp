@@ -21,6 +21,7 @@ struct LoopCorrection {
   std::uint64_t epoch = 0;
   MapIndex map = kNoMap;  ///< in which both ends are
   bool fix_scale = false;
+  bool upright = false;  ///< moved by yaw and translation alone
 
   /// Changes of structure, to be carried out in this order.
   struct Fusion {
@@ -47,9 +48,11 @@ struct LoopCorrection {
 /// points are the same on both sides (the loop's matches, and the far side's points projected into
 /// every corrected keyframe of the group); and builds the essential graph with the links that this
 /// makes. Points move with their FusionDraft::carrier(), those that have none with their reference
-/// keyframe. The correction has no keyframes when an end of the loop is dead or unpublished. Takes
-/// the map's read lock in short sections; the map is not changed. Throws std::invalid_argument
-/// unless the loop has one match, or an invalid id, per keypoint of its current keyframe.
+/// keyframe. In an upright map (Map::is_upright()) keyframes keep roll and pitch, see
+/// upright_correction(). The correction has no keyframes when an end of the loop is dead or
+/// unpublished. Takes the map's read lock in short sections; the map is not changed. Throws
+/// std::invalid_argument unless the loop has one match, or an invalid id, per keypoint of its
+/// current keyframe.
 LoopCorrection plan_loop_correction(const Map& map, const Loop& loop, bool fix_scale);
 
 /// Solves its graph in place (optimize_pose_graph()), without locks; nothing to do when it is

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "loops/seam.hpp"
+#include "loops/upright.hpp"
 #include "map/map_rewrite.hpp"
 
 namespace orbslam {
@@ -120,11 +121,20 @@ MapMerge plan_map_merge(const Map& map, const Loop& loop, bool fix_scale) {
   merge.loop = loop;
   std::optional<Seam> seam = draft_seam(map, loop, fix_scale);
   if (!seam || seam->near_map == seam->far_map) return merge;
-  const Similarity S_cf = fix_scale ? Similarity(loop.S_cw.pose()) : loop.S_cw;
+  Similarity S_cf = fix_scale ? Similarity(loop.S_cw.pose()) : loop.S_cw;
+  const bool near_upright = is_upright(map, seam->near_map);
+  const bool far_upright = is_upright(map, seam->far_map);
+  if (near_upright && far_upright) {
+    if (const auto turn = upright_correction(seam->draft.T_cw(0), S_cf)) S_cf = S_cf * *turn;
+  }
   const Similarity S_fn = S_cf.inverse() * Similarity(seam->draft.T_cw(0));  // near to far world
   merge.epoch = seam->epoch;
   merge.kept = std::min(seam->near_map, seam->far_map);
   merge.moved = std::max(seam->near_map, seam->far_map);
+  if (near_upright != far_upright) {
+    merge.kept = near_upright ? seam->near_map : seam->far_map;
+    merge.moved = near_upright ? seam->far_map : seam->near_map;
+  }
   merge.S_km = seam->near_map == merge.moved ? S_fn : S_fn.inverse();
   merge.fusions = seam->draft.take_fusions();
   merge.group = seam->group.keyframes;

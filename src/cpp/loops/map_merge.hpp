@@ -12,7 +12,9 @@
 namespace orbslam {
 
 /// What joining two maps does to them, worked out on copies. The younger one is moved into the
-/// world of the older one, whose frame and scale stay. See docs/method/several_maps.md#merging.
+/// world of the older one, whose frame and scale stay; one that is not upright into that of one
+/// that is. Two upright maps keep roll and pitch (upright_correction()). See
+/// docs/method/several_maps.md#merging.
 ///
 /// The caller keeps local mapping still from plan_map_merge() to apply_map_merge().
 struct MapMerge {

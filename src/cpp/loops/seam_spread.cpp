@@ -20,6 +20,7 @@ struct SeamGraph {
   std::vector<Similarity> uncorrected;  // where each is in the map
   std::vector<std::uint8_t> in_seam;
   PoseGraph graph;
+  bool upright = false;
 };
 
 void add_edges(const KeyFrame& keyframe, const std::vector<Pose>& before, SeamGraph& seam) {
@@ -62,6 +63,7 @@ SeamGraph gather_seam(const Map& map, const KeyFramePoses& poses,
   for (const KeyFrameId id : seam.ids) add_edges(*map.find(id), before, seam);
   seam.graph.S_iw = seam.uncorrected;
   seam.graph.fixed = seam.in_seam;
+  seam.upright = !seam.ids.empty() && map.is_upright(map.map_of(seam.ids.front()));
   return seam;
 }
 
@@ -118,6 +120,7 @@ bool spread_from_seam(Map& map, const KeyFramePoses& before, const std::vector<K
   if (n_fixed == 0 || n_fixed == static_cast<std::ptrdiff_t>(seam.ids.size())) return false;
   PoseGraphOptions options;
   options.fix_scale = fix_scale;
+  options.upright = seam.upright;
   const PoseGraphSummary summary = optimize_pose_graph(seam.graph, options, abort);
   if (summary.aborted || summary.iterations == 0) return false;
   MapRewrite rewrite;

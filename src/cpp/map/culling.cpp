@@ -78,7 +78,11 @@ int cull_recent_points(Map& map, KeyFrameId current, int min_observations,
   return n_killed;
 }
 
-std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_close) {
+std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_close,
+                                       const std::function<bool(KeyFrameId)>& is_needed) {
+  const auto may_go = [&](KeyFrameId id) {
+    return is_redundant(map, id, only_close) && !(is_needed && is_needed(id));
+  };
   std::vector<KeyFrameId> neighbours, died;
   {
     const auto lock = map.read_lock();
@@ -90,10 +94,10 @@ std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_c
       const auto lock = map.read_lock();
       const KeyFrame* neighbour = map.find(id);
       if (neighbour && map.is_root(*neighbour)) continue;
-      if (!is_redundant(map, id, only_close)) continue;
+      if (!may_go(id)) continue;
     }
     const auto lock = map.write_lock();
-    if (is_redundant(map, id, only_close) && map.erase_keyframe(id)) died.push_back(id);
+    if (may_go(id) && map.erase_keyframe(id)) died.push_back(id);
   }
   return died;
 }

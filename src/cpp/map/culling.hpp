@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "map/map.hpp"
@@ -20,8 +21,10 @@ int cull_recent_points(Map& map, KeyFrameId current, int min_observations,
 /// keyframes at the same or a finer scale, one level of slack (Mur-Artal et al. 2015, section
 /// VI-E). `only_close`, for sensors with depth: only points count whose depth was measured and is
 /// close. Keyframe 0 stays; leases and loop edges protect (Map::erase_keyframe()). Each neighbour
-/// is judged under the read lock, and again under the write lock before it dies. Returns the
-/// keyframes that died. See docs/method/mapping.md#culling-of-keyframes.
-std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_close);
+/// is judged under the read lock, and again under the write lock before it dies. `is_needed`,
+/// called under these locks, protects keyframes as well. Returns the keyframes that died. See
+/// docs/method/mapping.md#culling-of-keyframes.
+std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_close,
+                                       const std::function<bool(KeyFrameId)>& is_needed = {});
 
 }  // namespace orbslam

@@ -2,6 +2,9 @@
 #include "optimize/inertial_keyframes.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
 #include <utility>
 
 #include "inertial/inertial_filter.hpp"
@@ -12,6 +15,11 @@ namespace {
 
 // Longest time between two keyframes that samples join [s].
 constexpr double kLongest = 5.0;
+// Longest time between neighbours [s] that culling may leave, near the newest keyframe and before.
+constexpr double kGap = 0.5, kGapBefore = 3.0;
+// How long before the newest keyframe the first one holds [s]: in this time one camera's scale
+// becomes known.
+constexpr double kRecent = 15.0;
 // Times closer than this are the same [s]; seconds since 1970 are exact to 2e-7.
 constexpr double kSame = 1e-6;
 // Deviations of a bias from what it was before an adjustment, of the first motion of a chain that
@@ -69,6 +77,26 @@ std::vector<KeyFrameId> InertialKeyframes::newest(const Map& map, MapIndex which
   }
   std::reverse(chain.begin(), chain.end());
   return chain;
+}
+
+bool InertialKeyframes::is_needed(const Map& map, KeyFrameId id) const {
+  const std::lock_guard lock(mutex_);
+  const auto at = states_.find(id);
+  const KeyFrame* keyframe = map.find(id);
+  if (at == states_.end() || keyframe == nullptr) return false;
+  const auto time_of = [&](auto state, auto end) {
+    for (; state != end; ++state) {
+      const KeyFrame* other = map.find(state->first);
+      if (other != nullptr && other->map == keyframe->map) return other->frame->timestamp;
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+  };
+  const double before = time_of(std::make_reverse_iterator(at), states_.rend());
+  const double after = time_of(std::next(at), states_.end());
+  const double newest = time_of(states_.rbegin(), states_.rend());
+  if (std::isnan(after)) return true;    // the newest one
+  if (std::isnan(before)) return false;  // the chain begins later
+  return after - before > (newest - before < kRecent ? kGap : kGapBefore);
 }
 
 std::shared_ptr<const Preintegration> InertialKeyframes::between(double begin, double end,

@@ -33,6 +33,9 @@ class InertialKeyframes {
   /// Newest keyframes with a state of a map, up to `n`, by time. The caller holds a lock of the
   /// map.
   std::vector<KeyFrameId> newest(const Map& map, MapIndex which, std::size_t n) const;
+  /// Without this keyframe its neighbours in time would be too far apart: more than half a second,
+  /// or 3 s where the newest keyframe is 15 s later. The caller holds a lock of the map.
+  bool is_needed(const Map& map, KeyFrameId keyframe) const;
   /// Adds motions of the cameras of a bundle that are in `chain`, and links between neighbours.
   /// The caller holds a lock of the map.
   void add_to(GatheredBundle& bundle, const std::vector<KeyFrameId>& chain, const Map& map) const;

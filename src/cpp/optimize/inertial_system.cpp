@@ -3,18 +3,12 @@
 
 #include <Eigen/Dense>
 
+#include "inertial/so3.hpp"
+
 namespace orbslam {
 namespace {
 
 using Index = Eigen::Index;
-
-Matrix6d adjoint(const Pose& T) {
-  const Eigen::Matrix3d R = T.rotation_matrix();
-  Matrix6d Ad = Matrix6d::Zero();
-  Ad.topLeftCorner<3, 3>() = Ad.bottomRightCorner<3, 3>() = R;
-  Ad.bottomLeftCorner<3, 3>() = skew(T.translation()) * R;
-  return Ad;
-}
 
 Vector6d difference(const ImuBias& a, const ImuBias& b) {
   Vector6d d;

@@ -201,7 +201,9 @@ PoseGraphSummary optimize_pose_graph(PoseGraph& graph, const PoseGraphOptions& o
   summary.aborted = is_raised(abort);
   if (summary.aborted || options.iterations <= 0) return summary;
   BundleIterations rules(options.iterations, kConverged, abort);
-  if (options.fix_scale) {
+  if (options.upright) {
+    minimise<4>(graph, options, rules);
+  } else if (options.fix_scale) {
     minimise<6>(graph, options, rules);
   } else {
     minimise<7>(graph, options, rules);

@@ -22,8 +22,11 @@ struct PoseGraph {
 
 struct PoseGraphOptions {
   bool fix_scale = false;  ///< six degrees of freedom per vertex instead of seven
-  int iterations = 20;     ///< accepted steps at most
-  int n_threads = 1;       ///< 1 gives the same bytes in every run
+  /// Four degrees of freedom: with the scale, the direction of the world's third axis is kept in
+  /// every camera.
+  bool upright = false;
+  int iterations = 20;  ///< accepted steps at most
+  int n_threads = 1;    ///< 1 gives the same bytes in every run
   /// Solve by Eigen's sparse Cholesky, as always where Ceres comes without SuiteSparse: as fast for
   /// one loop and truly one thread, but slower by a multiple for thousands of vertices with many.
   bool eigen_cholesky = false;

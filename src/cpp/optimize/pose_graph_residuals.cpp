@@ -40,9 +40,15 @@ struct TangentMap {
 };
 
 template <int kParameters>
-void write(const TangentMap& map, double sign, double* out) {
+void write(const TangentMap& map, const PoseGraphView& view, double sign, double* out) {
   Eigen::Map<Eigen::Matrix<double, 7, kParameters, Eigen::RowMajor>> J(out);
   J.setZero();
+  if constexpr (kParameters == 4) {
+    J.template block<3, 1>(0, 0) = sign * map.A * view.up();
+    J.template block<3, 1>(3, 0) = sign * map.B * view.up();
+    J.template block<3, 3>(3, 1) = sign * map.D;
+    return;
+  }
   J.template block<3, 3>(0, 0) = sign * map.A;
   J.template block<3, 3>(3, 0) = sign * map.B;
   J.template block<3, 3>(3, 3) = sign * map.D;
@@ -55,7 +61,11 @@ void write(const TangentMap& map, double sign, double* out) {
 }  // namespace
 
 void PoseGraphView::move(const double* parameters, int n_parameters) {
-  const Eigen::Map<const Eigen::Vector3d> w(parameters), v(parameters + 3);
+  const bool upright = n_parameters == 4;
+  const Eigen::Vector3d w = upright
+                                ? parameters[0] * up_
+                                : Eigen::Vector3d(Eigen::Map<const Eigen::Vector3d>(parameters));
+  const Eigen::Map<const Eigen::Vector3d> v(parameters + (upright ? 1 : 3));
   const double log_scale = n_parameters == 7 ? parameters[6] : 0.0;
   valid_ = w.allFinite() && v.allFinite() && std::abs(log_scale) < kMaxLogScale;
   if (!valid_) return;
@@ -90,16 +100,17 @@ bool PoseGraphResidual<kParameters>::Evaluate(double const* const*, double* resi
     TangentMap map(left);
     map.multiply_by_adjoint(S_ji_);
     map.multiply_by_chart(*view_i_);
-    write<kParameters>(map, 1, jacobians[0]);
+    write<kParameters>(map, *view_i_, 1, jacobians[0]);
   }
   if (jacobians[1] != nullptr) {
     TangentMap map(left + similarity_ad(r));
     map.multiply_by_chart(*view_j_);
-    write<kParameters>(map, -1, jacobians[1]);
+    write<kParameters>(map, *view_j_, -1, jacobians[1]);
   }
   return true;
 }
 
+template class PoseGraphResidual<4>;
 template class PoseGraphResidual<6>;
 template class PoseGraphResidual<7>;
 

@@ -17,24 +17,28 @@ inline constexpr double kMaxLogScale = 100;
 /// scale. To first order that is the left perturbation (rotation, translation, logarithm of the
 /// scale). Where scales or rotations have drifted far, steps that leave the centres alone take half
 /// the iterations of such that do not, and being a plain vector space the chart saves Ceres a
-/// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept. See
+/// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept. Four
+/// parameters (a, v) stand for w = a R e_z: a camera turns about the third axis of the world. See
 /// docs/method/adjustment.md#pose-graph.
 class PoseGraphView {
  public:
-  explicit PoseGraphView(const Similarity& S_iw) : start_(S_iw), S_iw_(S_iw) {}
+  explicit PoseGraphView(const Similarity& S_iw)
+      : start_(S_iw), S_iw_(S_iw), up_(S_iw.rotation() * Eigen::Vector3d::UnitZ()) {}
 
-  /// Moves to the given six or seven parameters, unless they are not finite or the logarithm of
-  /// the scale gets out of hand: then the view is not valid and stays where it was.
+  /// Moves to the given four, six or seven parameters, unless they are not finite or the logarithm
+  /// of the scale gets out of hand: then the view is not valid and stays where it was.
   void move(const double* parameters, int n_parameters);
   bool valid() const { return valid_; }
 
   const Similarity& S_iw() const { return S_iw_; }
   const Eigen::Matrix3d& turn() const { return turn_; }  ///< exp(c) exp(w)
+  const Eigen::Vector3d& up() const { return up_; }      ///< third axis of the world, R e_z
   /// Left Jacobian of SO(3) at w: exp(w + d) = exp(left_jacobian * d) exp(w) to first order.
   const Eigen::Matrix3d& left_jacobian() const { return left_jacobian_; }
 
  private:
   Similarity start_, S_iw_;
+  Eigen::Vector3d up_;
   Eigen::Matrix3d turn_ = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d left_jacobian_ = Eigen::Matrix3d::Identity();
   bool valid_ = true;
@@ -45,7 +49,8 @@ Vector7d pose_graph_residual(const Similarity& S_ji, const Similarity& S_iw,
                              const Similarity& S_jw);
 
 /// The residual of an edge; its blocks are the parameters of view i and of view j, kParameters of
-/// each: 7, or 6 with scales kept. The views must have moved to them before.
+/// each: 7, 6 with scales kept, or 4 with roll and pitch kept as well. The views must have moved to
+/// them before.
 template <int kParameters>
 class PoseGraphResidual final : public ceres::SizedCostFunction<7, kParameters, kParameters> {
  public:

@@ -64,8 +64,9 @@ def evaluate(
     alignment: Annotated[
         Alignment,
         typer.Option(
-            help="se3 for metric estimates, sim3 for those of one camera; auto takes what fits "
-            "the run's sensor, or the lengths if that is not known."
+            help="se3 for metric estimates, sim3 for those of one camera, yaw for those with an IMU "
+            "if z is up in both worlds; auto takes what fits the run's sensor, or the lengths if "
+            "that is not known."
         ),
     ] = Alignment.AUTO,
     file_format: Annotated[
@@ -140,7 +141,9 @@ def evaluate(
             f"--offset has no meaning: poses are matched by {both.by}, not by two clocks; leave it "
             "out"
         )
-    single_camera = None if sensor is None else sensor is Sensor.MONOCULAR
+    single_camera = None
+    if sensor is not None:
+        single_camera = sensor is Sensor.MONOCULAR and not _knows_metres(trajectory)
     result = evaluate_trajectory(
         both.estimate,
         both.truth,
@@ -190,7 +193,7 @@ def _say_what_was_compared(
     if asked is Alignment.AUTO:
         why = {
             True: "a single camera",
-            False: "the run's sensor sees metres",
+            False: "the run's sensors measure metres",
             None: "chosen from the lengths of the paths, because the sensor is not known",
         }
         reason = why[result.single_camera]
@@ -307,6 +310,15 @@ def _sensor_of_run(trajectory: Path) -> Sensor | None:
         return Sensor(report["sensor"])
     except (OSError, ValueError, KeyError, TypeError, OrbSlamError):
         return None  # it may be of another program
+
+
+def _knows_metres(trajectory: Path) -> bool:
+    """Return whether an IMU made the map of a file's run metric, from its report."""
+    try:
+        report = json_module.loads((trajectory.parent / "report.json").read_text(encoding="utf-8"))
+        return report["imu"]["metric"] is True
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def _table(figures: dict[str, Any], trajectory: Path, ground_truth: Path) -> Table:

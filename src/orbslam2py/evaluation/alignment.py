@@ -24,10 +24,13 @@ class Alignment(str, Enum):
     """Rotation and translation."""
     SIM3 = "sim3"
     """Rotation, translation and scale: for a single camera, which has no metric scale."""
+    YAW = "yaw"
+    """Rotation about the third axis, which is up in both worlds, and translation: for estimates
+    with an IMU, whose errors of gravity then count."""
     NONE = "none"
     """No transform: both are in one world."""
     AUTO = "auto"
-    """``sim3`` for a single camera, ``se3`` for others;
+    """``sim3`` for a single camera without metres, ``se3`` for others;
     chosen by the lengths of the paths if the sensor is not known."""
 
     @classmethod

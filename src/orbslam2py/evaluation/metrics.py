@@ -23,6 +23,7 @@ from orbslam2py.trajectory import (
     Similarity,
     Trajectory,
     align,
+    align_yaw,
     lengths_along,
 )
 from orbslam2py.trajectory.rotations import inverse_poses, require_poses, rotation_angles
@@ -173,11 +174,11 @@ def evaluate_trajectory(
     truth
         True poses of the same camera in any world.
     alignment
-        ``se3`` for metric estimates, ``sim3`` for those of one camera, ``none`` if both share one
-        world. With ``sim3`` the relative errors are those of the scaled estimate. ``auto`` takes
+        ``se3`` for metric estimates, ``sim3`` for those of one camera, ``yaw`` for those with an
+        IMU if both worlds have the third axis up, ``none`` if both share one world. With ``sim3`` the relative errors are those of the scaled estimate. ``auto`` takes
         ``sim3`` for a single camera and ``se3`` for others.
     single_camera
-        Whether the estimate is of one camera without depth, for ``auto``. If it is not known, it is
+        Whether the estimate is of one camera without depth or an IMU, for ``auto``. If it is not known, it is
         assumed if lengths differ by a factor above 1.5 and scaling halves the error.
     max_difference
         Largest difference of matching time stamps [s].
@@ -248,6 +249,8 @@ def _transform(points: FloatArray, targets: FloatArray, alignment: Alignment) ->
     """Align if possible: figures that need no alignment are computed even without one."""
     if alignment is Alignment.NONE:
         return Similarity.identity()
+    if alignment is Alignment.YAW:
+        return _attempt(lambda: align_yaw(points, targets)) or Similarity.identity()
     with_scale = alignment is Alignment.SIM3 and len(points) >= alignment.fewest_poses
     found = _attempt(lambda: align(points, targets, with_scale=with_scale))
     return found or Similarity.identity()

@@ -57,6 +57,9 @@ def _contents(first: MapContents, second: MapContents) -> Iterator[str]:
         for root in sorted({*one.metric_roots} - {*other.metric_roots}):
             roots = one.keyframes.ids[one.keyframes.parent < 0]
             yield f"metres: map {np.searchsorted(roots, root)} only in the {which}"
+        for root in sorted({*one.upright_roots} - {*other.upright_roots}):
+            roots = one.keyframes.ids[one.keyframes.parent < 0]
+            yield f"upright: map {np.searchsorted(roots, root)} only in the {which}"
     unlike: set[str] = set()  # groups whose rows do not belong together
     for (name, mine), (_, theirs) in zip(first.arrays(), second.arrays(), strict=True):
         group, _, field = name.rpartition(".")

@@ -59,7 +59,10 @@ class MapContents:
     """(l, 2) ids of keyframes that a closed loop connects, ascending, the lower id first."""
     metric_roots: tuple[int, ...] = ()
     """First keyframes of single-camera maps whose unit was set to metres, ascending
-    (`transform_map`, ``map align``); maps of stereo and RGB-D cameras are not listed."""
+    (`transform_map`, ``map align``, an IMU); maps of stereo and RGB-D cameras are not listed."""
+    upright_roots: tuple[int, ...] = ()
+    """First keyframes of maps whose third axis is up and whose unit is the metre, by an IMU,
+    ascending."""
 
     def observations_of_point(self, point_id: int) -> tuple[IntArray, Int32Array]:
         """Return the observations of a point.
@@ -144,7 +147,7 @@ class MapContents:
         `map_index` is the number of the map in a run, not content, and is not compared. Words are
         compared if both maps have them.
         """
-        for name in ("next_keyframe", "next_point", "metric_roots"):
+        for name in ("next_keyframe", "next_point", "metric_roots", "upright_roots"):
             if getattr(self, name) != getattr(other, name):
                 return name
         for (name, mine), (_, theirs) in zip(self.arrays(), other.arrays(), strict=True):
@@ -166,6 +169,8 @@ class MapContents:
             digest.update(np.ascontiguousarray(array).data)
         if self.metric_roots:
             digest.update(f"\nmetric_roots {self.metric_roots}".encode())
+        if self.upright_roots:
+            digest.update(f"\nupright_roots {self.upright_roots}".encode())
         return digest.hexdigest()
 
 

@@ -221,7 +221,7 @@ class MapAutosave:
         self, changes: ChangedContents, writer: MapWriter, *, partly: bool
     ) -> Iterator[tuple[str, Row]]:
         contents = changes.contents
-        yield from settings_rows(self._settings, self._identity, contents.metric_roots)
+        yield from settings_rows(self._settings, self._identity, contents)
         runs = (*self._runs_before(contents), self._present_run(contents))
         for number, run in enumerate(runs):
             # Parts that are full change at the end alone; the last one is looked at again.

@@ -21,6 +21,7 @@ from orbslam2py.maps.content_groups import (
     RemovedKeyframes,
 )
 from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.units import sees_metres
 
 #: What the core has no need to know: which of its maps were given metres, and since which epoch.
 _metric_roots: weakref.WeakKeyDictionary[core.Map, tuple[int, tuple[int, ...]]] = (
@@ -97,6 +98,7 @@ def take_changes(
     epoch, roots = _metric_roots.get(slam_map, (-1, ()))
     if epoch == contents.map_index:  # else it was emptied since, and ids began anew
         contents = replace(contents, metric_roots=living_roots(roots, contents.keyframes))
+    contents = _with_upright_roots(contents, slam_map)
     return ChangedContents(contents, **groups["known"])
 
 
@@ -137,7 +139,35 @@ def restore_contents(
     restorer.add(arrays, len(keyframes))
     restorer.finish(slam_map, index)
     remember_metric_roots(slam_map, contents.metric_roots)
+    set_upright(slam_map, contents.upright_roots)
     return slam_map
+
+
+def _with_upright_roots(contents: MapContents, slam_map: core.Map) -> MapContents:
+    """Add what an IMU knows of the maps; one camera's upright maps are in metres."""
+    keyframes = contents.keyframes
+    roots = keyframes.ids[keyframes.parent < 0].tolist()
+    upright = tuple(root for root in roots if slam_map.is_upright(slam_map.map_of(root)))
+    if not upright:
+        return contents
+    metric = contents.metric_roots
+    if not sees_metres(contents):
+        metric = tuple(sorted({*metric, *upright}))
+    return replace(contents, metric_roots=metric, upright_roots=upright)
+
+
+def set_upright(slam_map: core.Map, roots: tuple[int, ...]) -> None:
+    """Note in a map of the core which of its maps are upright.
+
+    Parameters
+    ----------
+    slam_map
+        The map, just created.
+    roots
+        As in `MapContents.upright_roots`.
+    """
+    for root in roots:
+        slam_map.set_upright(slam_map.map_of(root))
 
 
 def remember_metric_roots(slam_map: core.Map, roots: tuple[int, ...]) -> None:

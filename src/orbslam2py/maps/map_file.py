@@ -11,7 +11,7 @@ from orbslam2py import _core as core
 from orbslam2py._arguments import path_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import contents_of
-from orbslam2py.maps.map_copies import remember_metric_roots
+from orbslam2py.maps.map_copies import remember_metric_roots, set_upright
 from orbslam2py.maps.map_reader import check_contents, check_frames, opened, read_head
 from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_tables import MapTables
@@ -34,7 +34,7 @@ class MapFile:
     ----------
     settings, vocabulary, runs, images, source
         As in `SavedMap`.
-    metric_roots : tuple of int
+    metric_roots, upright_roots : tuple of int
         As in `MapContents`.
     n_keyframes, n_points : int
         Of the map.
@@ -55,6 +55,7 @@ class MapFile:
         self.settings, self.vocabulary = head.settings, head.vocabulary
         self.runs, self.images = head.runs, head.images
         self.metric_roots = head.metric_roots
+        self.upright_roots = head.upright_roots
         self._totals = totals
         self.n_keyframes = int(n_keyframes)
         self.n_points = int(n_points or 0)
@@ -112,6 +113,7 @@ class MapFile:
                 restorer.add(part, n_keyframes)
             restorer.finish(slam_map, index)
         remember_metric_roots(slam_map, self.metric_roots)
+        set_upright(slam_map, self.upright_roots)
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[MapTables]:

@@ -30,6 +30,7 @@ from orbslam2py.maps.schema import (
     FORMAT_VERSION,
     HEADER_SIZE,
     IN_METRES,
+    UPRIGHT,
     Table,
     application_of,
     create_script,
@@ -72,7 +73,11 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
         head = read_head(connection, tables, images=images)
         contents = MapTables(connection, tables).contents()
         check_contents(contents, head.runs)
-    contents = replace(contents, metric_roots=living_roots(head.metric_roots, contents.keyframes))
+    contents = replace(
+        contents,
+        metric_roots=living_roots(head.metric_roots, contents.keyframes),
+        upright_roots=living_roots(head.upright_roots, contents.keyframes),
+    )
     return SavedMap(contents, head.settings, head.vocabulary, head.runs, head.images, source=named)
 
 
@@ -180,7 +185,8 @@ class Head(NamedTuple):
     runs: tuple[Run, ...]
     images: dict[int, bytes]
     metric_roots: tuple[int, ...]
-    """As in `MapContents`; the caller checks that they are roots."""
+    upright_roots: tuple[int, ...]
+    """Both as in `MapContents`; the caller checks that they are roots."""
 
 
 def read_head(connection: sqlite3.Connection, tables: dict[str, Table], *, images: bool) -> Head:
@@ -192,12 +198,14 @@ def read_head(connection: sqlite3.Connection, tables: dict[str, Table], *, image
     runs = tuple(_read_runs(connection, tables))
     pictures = read_rows(connection, tables["images"]) if images else []
     settings = _settings_of(yaml, Sensor(sensor))
-    return Head(settings, identity, runs, dict(pictures), _metric_roots_of(yaml))
+    roots = (_roots_of(yaml, IN_METRES), _roots_of(yaml, UPRIGHT))
+    return Head(settings, identity, runs, dict(pictures), *roots)
 
 
-def _metric_roots_of(yaml: str) -> tuple[int, ...]:
-    lines = [line for line in yaml.splitlines() if line.startswith(IN_METRES)]
-    words = lines[-1].removeprefix(IN_METRES).split() if lines else []
+def _roots_of(yaml: str, begin: str) -> tuple[int, ...]:
+    """Keyframes in the line that begins so."""
+    lines = [line for line in yaml.splitlines() if line.startswith(begin)]
+    words = lines[-1].removeprefix(begin).split() if lines else []
     return tuple(sorted({int(word) for word in words if _ID.fullmatch(word)}))
 
 

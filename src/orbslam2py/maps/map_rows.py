@@ -21,6 +21,7 @@ from orbslam2py.maps.schema import (
     IDS_PER_PAGE,
     IN_METRES,
     TABLES,
+    UPRIGHT,
     Blob,
     Table,
 )
@@ -50,12 +51,16 @@ def checksum(row: Row) -> int:
 
 # ---- the tables that say what the map is of ---------------------------------------------------
 def settings_rows(
-    settings: Settings, vocabulary: VocabularyIdentity, metric_roots: tuple[int, ...] = ()
+    settings: Settings, vocabulary: VocabularyIdentity, contents: MapContents
 ) -> Iterator[tuple[str, Row]]:
-    """Camera and vocabulary, as (table, row), and which maps are in metres."""
+    """Camera and vocabulary, as (table, row), and which maps are in metres and upright."""
     yaml = settings.to_yaml()
-    if metric_roots:
-        yaml += f"{IN_METRES} {' '.join(map(str, metric_roots))}\n"
+    for begin, roots in (
+        (IN_METRES, contents.metric_roots),
+        (UPRIGHT, contents.upright_roots),
+    ):
+        if roots:
+            yaml += f"{begin} {' '.join(map(str, roots))}\n"
     yield "settings", (1, str(settings.sensor), yaml)
     yield "vocabulary", (1, vocabulary.name, vocabulary.hash, vocabulary.comment)
 
@@ -128,8 +133,7 @@ def _keypoint_blobs(keyframes: Keyframes, row: int) -> Iterator[Any]:
 
 def all_rows(saved: SavedMap) -> Iterator[tuple[str, Row]]:
     """A whole map file, as (table, row)."""
-    roots = saved.contents.metric_roots
-    yield from settings_rows(saved.settings, saved.vocabulary, roots)
+    yield from settings_rows(saved.settings, saved.vocabulary, saved.contents)
     for number, run in enumerate(saved.runs):
         yield from run_rows(number, run)
     yield from map_rows(saved.contents)

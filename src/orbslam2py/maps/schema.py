@@ -13,6 +13,8 @@ FORMAT_VERSION = 5
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
 #: Programs that know nothing of it take it for a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
+#: The same for the roots of maps whose third axis is up, by an IMU.
+UPRIGHT = "# Upright maps, by their roots:"
 #: A row of `map_points` and of `observations` holds the points of this number of ids.
 IDS_PER_PAGE = 256
 #: Frames in a row of `frames`.

@@ -109,8 +109,10 @@ def find_imu(
     return ImuOfRun(settings, samples)
 
 
-def imu_entry(check: ImuCheck, n_samples: int) -> dict[str, Any]:
+def imu_entry(check: ImuCheck, n_samples: int, *, metric: bool) -> dict[str, Any]:
     """Say for ``report.json`` whether the IMU fits the camera, and what was measured of it.
+
+    `metric`: the IMU has turned the main map upright and, with one camera, scaled it to metres.
 
     Time offset in seconds, rotation from IMU to camera (3, 3), bias of the gyro in rad/s, gravity
     in m/s^2; None where the motion did not tell them.
@@ -121,6 +123,7 @@ def imu_entry(check: ImuCheck, n_samples: int) -> dict[str, Any]:
     return {
         "samples": n_samples,
         "verdict": str(check.verdict),
+        "metric": metric,
         "faults": [{"kind": fault.kind, "text": fault.text} for fault in check.faults],
         "time_offset": None if rates is None else rates.offset,
         "time_offset_deviation": None if rates is None else rates.offset_deviation,

@@ -34,7 +34,6 @@ from orbslam2py.runs.report_page.frame_images import (
 )
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.run_picture import anchored_points, draw_maps_of_run, draw_run
-from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 from orbslam2py.trajectory.frame_times import is_frame_table
 
@@ -246,7 +245,7 @@ class OutputWriter:
             self._write("imu.yaml", result.imu_settings.save)
         self._write_trajectories(result, evaluation)
         points = anchored_points(result)
-        unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"
+        unit = "m" if result.is_metric else "units"
         self._write("points.ply", lambda path: write_ply(path, points, unit=unit))
         if result.drawing is not None:
             self._write("map.npz", result.drawing.save)

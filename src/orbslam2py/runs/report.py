@@ -46,6 +46,8 @@ class RunEvaluation:
     """Ground truth during the whole run, in the estimate's frame and unit."""
     height: Height
     """The up direction in the estimate's frame."""
+    scaled: Evaluation | None = None
+    """With the scale of the alignment: only for one camera with an IMU, to judge its metres."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
@@ -57,14 +59,15 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
         None if there is no ground truth, or no pose has a true one.
     """
     estimate = result.tracked_trajectory()
-    # The unit of length of a single camera is its own.
-    monocular = result.options.sensor is Sensor.MONOCULAR
-    alignment = Alignment.SIM3 if monocular else Alignment.SE3
+    alignment = Alignment.SE3 if result.is_metric else Alignment.SIM3
     try:
         truth = result.sequence.ground_truth()
         if truth is None or not len(estimate):
             return None
         figures = evaluate_trajectory(estimate, truth, alignment)
+        scaled = None
+        if result.is_metric and result.options.sensor is Sensor.MONOCULAR:
+            scaled = evaluate_trajectory(estimate, truth, Alignment.SIM3)
     except (OrbSlamError, OSError) as error:
         _log.warning("no comparison with ground truth: %s", describe_error(error))
         return None
@@ -73,7 +76,8 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
     height = height_of(result.sequence, estimate, truth)
-    return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc), height)
+    path = Trajectory(during.timestamps, T_wc)
+    return RunEvaluation(figures, keyframes_ate, path, height, scaled)
 
 
 def _ate_of_keyframes(
@@ -149,6 +153,9 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     if evaluation is not None:
         report |= evaluation.figures.as_dict()
         report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
+        if evaluation.scaled is not None and evaluation.scaled.ate is not None:
+            report["ate_scaled_rmse_m"] = evaluation.scaled.ate.rmse
+            report["ate_scaled_scale"] = evaluation.scaled.transform.scale
     return report
 
 

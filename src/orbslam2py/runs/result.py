@@ -151,6 +151,11 @@ class RunResult:
         """Number of frames that were dropped in real time."""
         return self.n_lost_by_camera + sum(row.state == "DROPPED" for row in self.rows)
 
+    @property
+    def is_metric(self) -> bool:
+        """Whether lengths of the main map are metres: with depth, or where an IMU scaled it."""
+        return self.options.sensor.has_depth or bool((self.imu or {}).get("metric"))
+
     def tracked_trajectory(self) -> Trajectory:
         """Number of frames of the main map with a pose, after the last optimisation."""
         if not self.trajectories:

@@ -18,7 +18,6 @@ from orbslam2py.runs.report_page.explained import compared_over
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.several_maps import draw_maps, maps_of_run
 from orbslam2py.runs.timeline import Timeline
-from orbslam2py.settings.sensor import Sensor
 
 #: Least number of poses with a true one at their time to compute the scale.
 _POSES_FOR_SCALE = 3
@@ -105,7 +104,7 @@ def draw_maps_of_run(path: Path, result: RunResult, report: dict[str, Any]) -> N
         path,
         drawn,
         title=f"{report['sequence']} ({report['sensor']}): {len(drawn)} maps",
-        unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
+        unit="m" if result.is_metric else "units",
         main=result.main_map,
     )
 
@@ -113,9 +112,10 @@ def draw_maps_of_run(path: Path, result: RunResult, report: dict[str, Any]) -> N
 def metres_per_unit(result: RunResult, evaluation: RunEvaluation | None) -> float | None:
     """Return metres per unit of the map; None if unknown.
 
-    A single camera's map has its own unit of length: only ground truth gives its size.
+    A single camera's map has its own unit of length unless an IMU gave it metres: only ground
+    truth gives its size.
     """
-    if result.options.sensor is not Sensor.MONOCULAR:
+    if result.is_metric:
         return 1.0
     if evaluation is None or evaluation.figures.alignment is not Alignment.SIM3:
         return None

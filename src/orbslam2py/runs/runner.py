@@ -178,11 +178,14 @@ class SequenceRunner:
         if self._imu is not None:
             result.imu_settings = self._imu.settings
         if system.imu_check is not None:
-            result.imu = imu_entry(system.imu_check, system.pipeline.inertial.n_samples)
             result.warnings += [fault.text for fault in system.imu_check.faults]
         result.calibration_warnings = self._calibration_warnings(system)
         result.warnings += result.calibration_warnings
         self._collect(system)
+        if system.imu_check is not None:
+            n_samples = system.pipeline.inertial.n_samples
+            metric = system.pipeline.back_end.map.is_upright(result.main_map)
+            result.imu = imu_entry(system.imu_check, n_samples, metric=metric)
         result.seconds = time.perf_counter() - begin
         return result
 

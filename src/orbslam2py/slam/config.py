@@ -17,6 +17,7 @@ from typing import Any
 from orbslam2py._arguments import is_finite, is_whole, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.inertial_config import InertialConfig
 
 #: The numbers of inliers below are for images with so many features or more. Of fewer ones a share
 #: is asked for: fewer points meet fewer keypoints by chance, and fewer can be found of them.
@@ -376,6 +377,7 @@ class Config:
     merging: MergingConfig = field(default_factory=MergingConfig)
     trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
     alignment: AlignmentConfig = field(default_factory=AlignmentConfig)
+    inertial: InertialConfig = field(default_factory=InertialConfig)
 
     def with_changes(self, changes: Mapping[str, Any]) -> Config:
         """Return a configuration with other values.

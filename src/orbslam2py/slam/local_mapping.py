@@ -143,6 +143,8 @@ class LocalMapping:
                     measures_noise=self._alignment is not None and self._alignment.noise == 0,
                 )
         with timer("mapping.cull_keyframes"):
-            culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)
+            culled = core.cull_keyframes(
+                self._map, keyframe, not self._monocular, inertial=self.inertial
+            )
             for dead in culled.tolist():
                 self._keyframe_index.erase(dead)

@@ -82,15 +82,16 @@ class LoopClosing:
     ) -> None:
         self._map = slam_map
         self._keyframe_index = keyframe_index
-        self._fix_scale = sensor.has_depth
+        self._has_depth = sensor.has_depth
         self._mapping = mapping
         self._adjustment = adjustment
         self._enabled = options.loop_closing
         self._adjust = options.full_adjustment
         self._limits = config.loops
-        self._verification = core.LoopVerificationOptions(
-            fix_scale=self._fix_scale, seed=options.seed % 2**64
-        )
+        self._verifications = {
+            fix: core.LoopVerificationOptions(fix_scale=fix, seed=options.seed % 2**64)
+            for fix in (False, True)
+        }
         self._on_loop = on_loop
         self._on_merge = on_merge
         self._merging = MapMerging(
@@ -98,7 +99,7 @@ class LoopClosing:
             self._confirm,
             self._find_alike,
             self._lease,
-            fix_scale=self._fix_scale,
+            fixes_scale=self._fixes_scale,
             config=config.merging,
         )
         self._waiting = PendingLoop(slam_map, self._confirm, self._release, self._limits)
@@ -212,7 +213,13 @@ class LoopClosing:
         return [place.keyframe for place in found]
 
     def _confirm(self, keyframe: int, candidate: int) -> core.Loop | None:
-        return core.verify_loop_candidate(self._map, keyframe, candidate, self._verification)
+        options = self._verifications[self._fixes_scale(keyframe, candidate)]
+        return core.verify_loop_candidate(self._map, keyframe, candidate, options)
+
+    def _fixes_scale(self, *keyframes: int) -> bool:
+        """Return whether the maps of keyframes are in metres: with depth, or by an IMU."""
+        slam_map = self._map
+        return self._has_depth or all(slam_map.is_upright(slam_map.map_of(k)) for k in keyframes)
 
     def _joins_maps(self, loop: core.Loop) -> bool:
         return self._map.map_of(loop.current) != self._map.map_of(loop.matched)
@@ -230,11 +237,12 @@ class LoopClosing:
         found = confirmed(proposals.consistent)
         loops = [loop for loop in found if not self._joins_maps(loop)]
         elsewhere = [loop for loop in found if self._joins_maps(loop)]
-        best = core.choose_loop(self._map, loops, self._fix_scale)
+        fix_scale = self._fixes_scale(keyframe)
+        best = core.choose_loop(self._map, loops, fix_scale)
         if best is None:
             return self._merging.choose(elsewhere, lambda: [*loops, *confirmed(proposals.others)])
         loops += [loop for loop in confirmed(proposals.others) if not self._joins_maps(loop)]
-        if core.choose_loop(self._map, loops, self._fix_scale) is None:
+        if core.choose_loop(self._map, loops, fix_scale) is None:
             _log.info("keyframe %d looks like several places; no loop closed", keyframe)
             return None
         return best
@@ -271,7 +279,8 @@ class LoopClosing:
                 ticket.wait()
             self._map.update_connections(loop.current)
             with timer("plan"):
-                correction = core.plan_loop_correction(self._map, loop, self._fix_scale)
+                fix_scale = self._fixes_scale(loop.current)
+                correction = core.plan_loop_correction(self._map, loop, fix_scale)
             with timer("graph"):
                 graph = core.optimize_essential_graph(correction, self.worker.cancel_flag)
             if graph.aborted:

@@ -31,6 +31,7 @@ from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingL
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput, InertialTracker
+from orbslam2py.slam.inertial_config import InertialConfig
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.kept_images import KeptImages
@@ -111,7 +112,7 @@ class Pipeline:
         self._kept_images = KeptImages(every_frame=config.trajectory.rematch_every_frame)
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         #: Uses the IMU in tracking; None without settings of one.
-        self.inertial_tracker = _make_inertial(setup, back_end)
+        self.inertial_tracker = _make_inertial(setup, back_end, config.inertial)
         self.tracking = _make_tracking(setup, back_end, options, config, self.inertial_tracker)
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(
@@ -390,6 +391,8 @@ class Pipeline:
         self.tracking.reset()
         self.front_end.reset()
         self.inertial.restart()
+        if self.inertial_tracker is not None:
+            self.inertial_tracker.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
 
@@ -432,7 +435,9 @@ def _make_search(
     )
 
 
-def _make_inertial(setup: Setup, back_end: BackEnd) -> InertialTracker | None:
+def _make_inertial(
+    setup: Setup, back_end: BackEnd, config: InertialConfig
+) -> InertialTracker | None:
     """The tracker of an IMU; None without settings of one."""
     if setup.imu is None:
         return None
@@ -442,6 +447,7 @@ def _make_inertial(setup: Setup, back_end: BackEnd) -> InertialTracker | None:
         setup.imu,
         metric=setup.sensor.has_depth,
         idle=lambda: all(worker.idle for worker in workers),
+        config=config,
     )
     back_end.mapping.inertial = tracker.keyframes
     return tracker

@@ -247,7 +247,7 @@ class Tracking:
         if self._inertial is not None and self._state.phase is TrackingState.OK:
             estimate = self._inertial.judge(frame, estimate, self._state.motion)
             if estimate.method is PoseMethod.IMU:
-                return TrackingResult(self._state.phase, estimate)
+                return self._follow_imu(self._inertial, frame, estimate, localize=localize)
         if not estimate.found:
             begun = self._begin_map_beside(frame, timer, localize=localize)
             return begun or self._lose(frame, estimate)
@@ -271,6 +271,31 @@ class Tracking:
         # frame must not start from them.
         frame.discard_outliers()
         return TrackingResult(self._state.phase, estimate, is_keyframe, inliers=inliers)
+
+    def _follow_imu(
+        self,
+        inertial: InertialTracker,
+        frame: core.TrackedFrame,
+        estimate: PoseEstimate,
+        *,
+        localize: bool,
+    ) -> TrackingResult:
+        """Keep a pose that the IMU predicted; where the map does not reach, extend it.
+
+        With depth the frame becomes a keyframe at this pose. A single camera is lost then, and
+        begins another map as without an IMU.
+        """
+        if localize or not inertial.is_beyond_map(frame, self._initializer.shows_enough(frame)):
+            return TrackingResult(self._state.phase, estimate)
+        if not self._has_depth:
+            inertial.end_of_map()
+            return self._lose(frame, estimate.failed(Reason.WEAK_EVIDENCE))
+        _log.info("the map continues at frame %d, where the IMU has led", frame.id)
+        self._create_keyframe(frame)
+        self._apply(Tracked(frame, frame.n_associated(), self._map.active_map))
+        inertial.map_continued(frame)
+        inertial.keyframe_made(self._state.since_keyframe.keyframe, frame)
+        return TrackingResult(self._state.phase, estimate, is_keyframe=True)
 
     def _find_pose(
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
@@ -308,8 +333,11 @@ class Tracking:
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingResult:
         with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame)
+            T_cw = None if self._inertial is None else self._inertial.pose_to_begin_at
+            reason = self._initializer.try_initialize(frame, T_cw)
         if reason is Reason.NONE:
+            if self._inertial is not None:
+                self._inertial.map_begun(T_cw)
             return self._map_begun(frame)
         spoilt = self._map.active_map if reason is Reason.INITIAL_MAP_FAILED else None
         return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=spoilt)
@@ -339,7 +367,10 @@ class Tracking:
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingResult:
         if not self._state.is_lost:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
-        self._apply(NotFound(frame.timestamp))
+        since = frame.timestamp
+        if self._inertial is not None and self._inertial.is_adrift:
+            since = self._inertial.last_seen  # the images showed nothing from then on
+        self._apply(NotFound(since))
         frame.clear_associations()
         frame.T_cw = None
         # A map that was loaded, or used for localization, is the user's, however small.

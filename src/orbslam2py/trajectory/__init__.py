@@ -14,7 +14,7 @@ from orbslam2py.trajectory.files import (
 )
 from orbslam2py.trajectory.frame_times import FrameTable, read_frame_table, read_times
 from orbslam2py.trajectory.layouts import TRAJECTORY_LAYOUTS, TrajectoryLayout
-from orbslam2py.trajectory.similarity import Similarity, align
+from orbslam2py.trajectory.similarity import Similarity, align, align_yaw
 from orbslam2py.trajectory.time_units import TimeUnit, unit_by_other
 from orbslam2py.trajectory.trajectory import Trajectory, lengths_along
 from orbslam2py.trajectory.writers import TrajectoryFormat, write_euroc, write_kitti, write_tum
@@ -32,6 +32,7 @@ __all__ = [
     "TrajectoryFormat",
     "TrajectoryLayout",
     "align",
+    "align_yaw",
     "associate",
     "lengths_along",
     "read_euroc",

@@ -144,6 +144,39 @@ def align(
     return Similarity(scale, R, target_centre - scale * R @ centre)
 
 
+def align_yaw(points: FloatArray, targets: FloatArray) -> Similarity:
+    """Estimate yaw and translation from points to their targets by least squares.
+
+    Parameters
+    ----------
+    points, targets
+        float64 (n, 3), at least one, in worlds whose third axis is up.
+
+    Returns
+    -------
+    Similarity
+        Of scale 1; its rotation is one about the third axis.
+
+    Raises
+    ------
+    DatasetError
+        If they are no such arrays.
+    """
+    points = array_of(points, "points", (-1, 3))
+    targets = array_of(targets, "targets", (-1, 3))
+    if len(points) != len(targets) or not len(points):
+        raise DatasetError(
+            f"{len(points)} points cannot be aligned to {len(targets)} targets; give one target "
+            "per point, at least one"
+        )
+    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
+    (x, y), (u, v) = (points - centre).T[:2], (targets - target_centre).T[:2]
+    yaw = np.arctan2(np.sum(x * v - y * u), np.sum(x * u + y * v))
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    R = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return Similarity(1.0, R, target_centre - R @ centre)
+
+
 def _least_rotation(direction: FloatArray, target: FloatArray) -> FloatArray:
     """Return the smallest rotation (3, 3) from one unit vector to another."""
     cosine = float(direction @ target)

@@ -81,6 +81,23 @@ void LocalMapping::reset() {
   worker.reset();
   inserted_.clear();
   recent_.clear();
+  if (inertial_) inertial_->clear();
+  sampled_until_ = 0;
+}
+
+void LocalMapping::use_imu() {
+  inertial_ = std::make_unique<InertialKeyframes>(Pose(), ImuNoise{1e2, 1e3, 1, 10});
+}
+
+void LocalMapping::add_inertial(KeyFrameId keyframe, double timestamp) {
+  if (!inertial_) return;
+  constexpr double kStep = 0.02;
+  std::vector<ImuSample> samples;
+  double t = sampled_until_;
+  for (; t < timestamp + kStep; t += kStep) samples.push_back({t, {0, 0, 0}, {0, 0, 9.81}});
+  sampled_until_ = t;
+  inertial_->add_samples(samples);
+  inertial_->set(keyframe, Eigen::Vector3d::Zero(), {});
 }
 
 void LocalMapping::process(KeyFrameId keyframe) {
@@ -93,8 +110,13 @@ void LocalMapping::process(KeyFrameId keyframe) {
   if (worker.n_waiting() == 0) fuse_with_neighbours(map_, keyframe, 10);
   if (worker.lower_interrupt()) {
     local_bundle_adjustment(map_, keyframe, &worker.interrupt_flag.value(), false,
-                            kAdjustmentThreads);
-    for (const KeyFrameId dead : cull_keyframes(map_, keyframe, true)) index_.erase(dead);
+                            kAdjustmentThreads, BundleOptions().solver, inertial_.get());
+    const auto is_needed = [&](KeyFrameId id) {
+      return inertial_ && inertial_->is_needed(map_, id);
+    };
+    for (const KeyFrameId dead : cull_keyframes(map_, keyframe, true, is_needed)) {
+      index_.erase(dead);
+    }
   }
   on_done(keyframe);
 }

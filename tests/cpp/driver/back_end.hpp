@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "loops/loop_detection.hpp"
 #include "loops/loop_verification.hpp"
 #include "map/map.hpp"
+#include "optimize/inertial_keyframes.hpp"
 #include "places/keyframe_index.hpp"
 
 namespace orbslam::driver {
@@ -35,6 +37,11 @@ class LocalMapping {
   std::function<void(KeyFrameId)> on_done;
   /// Called by the tracker; mapping of the keyframe begins with start().
   void insert_keyframe(KeyFrameId keyframe) { inserted_.push_back(keyframe); }
+  /// From here on an IMU measures along. Its samples and states are those of a camera at rest, with
+  /// so much noise that they weigh nothing.
+  void use_imu();
+  /// Samples up to a keyframe that was just inserted, and its state; called by the tracker.
+  void add_inertial(KeyFrameId keyframe, double timestamp);
   void start();
   void reset();
   Worker worker;
@@ -47,6 +54,8 @@ class LocalMapping {
   Counts& counts_;
   std::vector<KeyFrameId> inserted_;
   std::vector<MapPointId> recent_;
+  std::unique_ptr<InertialKeyframes> inertial_;
+  double sampled_until_ = 0;
 };
 
 /// The adjustment of full_adjustment.py.

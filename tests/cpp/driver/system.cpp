@@ -21,6 +21,7 @@ System::System(ImageRing& images, Counts& counts, Watchdog& watchdog, std::uint6
       tracker_(map_, index_, mapping_, counts),
       patient_(seed % 3 != 0),
       view_(static_cast<std::int64_t>(images.size() + seed % 1000)) {
+  mapping_.use_imu();
   mapping_.on_done = [this](KeyFrameId keyframe) { loop_closing_.worker.submit(keyframe); };
   for (Worker* worker : map_workers()) worker->start();
 }

@@ -189,6 +189,7 @@ bool Tracker::needs_keyframe(const TrackedFrame& frame) const {
 void Tracker::insert(TrackedFrame& frame, std::size_t n_minimum) {
   reference_ = insert_keyframe(map_, frame, true, n_minimum);
   last_keyframe_ = frame.frame->id;
+  mapping_.add_inertial(reference_, frame.frame->timestamp);
   mapping_.insert_keyframe(reference_);
 }
 

@@ -143,6 +143,42 @@ TEST(InertialFilter, LeadsThroughThreeSecondsWithoutImages) {
   EXPECT_NEAR(distance / kRuns, 6, 2.5);
 }
 
+TEST(InertialFilter, GoesOnFromAnAnchoredPose) {
+  // After three seconds without images the map continues at the predicted pose, in axes of its own.
+  std::mt19937_64 random(6);
+  const Matrix6d R = image_deviation().cwiseAbs2().asDiagonal();
+  double distance = 0;
+  constexpr int kRuns = 40;
+  for (int run = 0; run < kRuns; ++run) {
+    F filter = drawn_filter(random, 0);
+    Pose moved;  // from the true world to the one of the new part
+    double t = 0;
+    for (int image = 0; image < 280; ++image, t = 0.05 * image) {
+      filter.predict(testing::measured(AnalyticMotion::samples(t, t + 0.05, 20), testing::kNoise,
+                                       testing::kBias, random));
+      if (image == 260) {
+        const Pose T_wb(AnalyticMotion::rotation(t + 0.05), AnalyticMotion::position(t + 0.05));
+        moved = filter.state().T_wb * T_wb.inverse();
+        filter.anchor();
+        EXPECT_LT(filter.pose().covariance.norm(), 1e-12);
+      } else if (image < 200 || image > 260) {
+        const Pose T_cw = camera_at(t + 0.05) * moved.inverse();
+        filter.update(Pose::exp(drawn(random, image_deviation())) * T_cw, R);
+      }
+    }
+    Eigen::Matrix<double, 5, 1> e;
+    e << moved.rotation() * AnalyticMotion::velocity(t) - filter.state().velocity,
+        so3_log(moved.rotation()).head<2>() - filter.tilt();
+    Eigen::Matrix<double, 5, 5> P;
+    P << filter.covariance().block<3, 3>(F::kVelocity, F::kVelocity),
+        filter.covariance().block<3, 2>(F::kVelocity, F::kTilt),
+        filter.covariance().block<2, 3>(F::kTilt, F::kVelocity),
+        filter.covariance().block<2, 2>(F::kTilt, F::kTilt);
+    distance += e.dot(P.ldlt().solve(e));
+  }
+  EXPECT_NEAR(distance / kRuns, 5, 2);
+}
+
 TEST(InertialFilter, AFusedPoseIsThatOfAnUpdate) {
   std::mt19937_64 random(4);
   F one = drawn_filter(random, 0);

@@ -74,6 +74,35 @@ TEST(InertialStart, FindsScaleGravityAndBiases) {
   EXPECT_NEAR(cost / freedom, 1, 0.2);
 }
 
+TEST(InertialStart, KeepsWhatIsKnownOfAMap) {
+  // One second, in which the scale and gravity are hardly determined, of an upright map in metres.
+  std::mt19937_64 random(5);
+  double tilts = 0, scales = 0;
+  constexpr int kRuns = 20;
+  for (int run = 0; run < kRuns; ++run) {
+    Data all = data(8, 0.15, 1, random);
+    const double lean = 0.01 * normal(random), growth = std::exp(0.01 * normal(random));
+    const Eigen::Quaterniond up = so3_exp({lean, 0, 0}) * kTurn.conjugate();
+    for (InertialView& view : all.views) {
+      view.T_wc = Pose(up * view.T_wc.rotation(), growth * (up * view.T_wc.translation()));
+    }
+    InertialStartOptions options;
+    options.rotation_deviation = 1e-3;
+    options.position_deviation = 2e-3;
+    options.known_gravity = options.known_scale = 0.01;
+    const InertialStart start =
+        estimate_inertial_start(all.views, all.samples, testing::kT_cb, testing::kNoise, options);
+    ASSERT_TRUE(start.solved);
+    EXPECT_LT(start.gravity_deviation, 0.0101);
+    EXPECT_LT(start.scale_deviation, 0.0101);
+    const double off = angle(start.gravity, so3_exp({lean, 0, 0}) * testing::kFall);
+    tilts += off * off / (start.gravity_deviation * start.gravity_deviation);
+    scales += std::pow(std::log(start.scale * growth) / start.scale_deviation, 2);
+  }
+  EXPECT_LT(tilts / kRuns, 2);  // of two degrees of freedom
+  EXPECT_LT(scales / kRuns, 2);
+}
+
 TEST(InertialStart, KnowsTheScaleOfADepthSensor) {
   std::mt19937_64 random(2);
   const InertialStart start = start_of(data(21, 0.2, 1, random), true);

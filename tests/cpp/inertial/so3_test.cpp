@@ -29,5 +29,13 @@ TEST(So3, RightJacobianIsTheDerivative) {
   }
 }
 
+TEST(So3, AdjointCarriesATangentThroughAPose) {
+  const Pose T(so3_exp({0.3, -1.1, 0.4}), Eigen::Vector3d(1, -2, 0.5));
+  Vector6d d;
+  d << 0.2, 0.1, -0.3, 0.5, -0.4, 0.7;
+  const Pose left = T * Pose::exp(d), right = Pose::exp(adjoint(T) * d) * T;
+  EXPECT_LT((left.matrix() - right.matrix()).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace orbslam

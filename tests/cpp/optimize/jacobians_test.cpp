@@ -179,6 +179,7 @@ void check_pose_graph_edges(std::uint64_t seed) {
 
 // OD-114: derivatives of similarities are analytic.
 TEST(Jacobians, PoseGraphEdges) { check_pose_graph_edges<7>(2); }
+TEST(Jacobians, PoseGraphEdgesOfUprightCameras) { check_pose_graph_edges<4>(4); }
 TEST(Jacobians, PoseGraphEdgesWithScalesKept) { check_pose_graph_edges<6>(3); }
 
 // OD-114: derivatives of similarities are analytic.

@@ -195,6 +195,36 @@ TEST(OptimizePoseGraph, AgreesWithNumericallyDifferentiatedMatrixLogarithms) {
   }
 }
 
+TEST(OptimizePoseGraph, UprightCamerasKeepRollAndPitch) {
+  PoseGraph graph = walk(80, 4, 0, 0);
+  const std::vector<Similarity> truth = graph.S_iw;
+  // Errors of yaw and place that grow along the walk.
+  std::mt19937_64 random(4);
+  Similarity error;
+  for (std::size_t i = 1; i < graph.S_iw.size(); ++i) {
+    Vector7d step = testing::random_tangent(random, 0, 0.1, 0);
+    step(2) = testing::uniform(random, -0.03, 0.03);
+    error = Similarity::exp(step) * error;
+    graph.S_iw[i] = graph.S_iw[i] * error;
+  }
+  PoseGraph tilted = graph;
+  PoseGraphOptions options;
+  options.upright = true;
+  optimize_pose_graph(graph, options, nullptr);
+  EXPECT_LT(worst(graph.S_iw, truth), 1e-9);
+  // A measurement that contradicts gravity turns no camera about another axis.
+  Vector7d off = Vector7d::Zero();
+  off(0) = 0.2;
+  tilted.edges.back().S_ji = Similarity::exp(off) * tilted.edges.back().S_ji;
+  const std::vector<Similarity> before = tilted.S_iw;
+  EXPECT_GT(optimize_pose_graph(tilted, options, nullptr).iterations, 0);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+    EXPECT_LT((tilted.S_iw[i].rotation() * up - before[i].rotation() * up).norm(), 1e-12);
+    EXPECT_EQ(tilted.S_iw[i].scale(), 1);
+  }
+}
+
 TEST(OptimizePoseGraph, CostsAreSumsOverAllEdges) {
   PoseGraph graph = walk(30, 3, 0.02, 0.02);
   graph.fixed[10] = graph.fixed[11] = 1;  // the edge between the two counts as well

@@ -52,6 +52,23 @@ def test_command(tmp_path: Path) -> None:
     assert "rpe rotation rmse over 1 s" in result.output
 
 
+@pytest.mark.parametrize("metric", [True, False])
+def test_one_camera_with_an_imu_is_judged_without_scale(tmp_path: Path, metric: bool) -> None:
+    truth = wander(100)
+    write_tum(tmp_path / "trajectory.txt", shrunk(truth))
+    write_tum(tmp_path / "b.txt", truth)
+    report = {"sensor": "mono", "imu": {"metric": metric}}
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    arguments = [str(tmp_path / "trajectory.txt"), str(tmp_path / "b.txt")]
+    result = CliRunner().invoke(app, [*arguments, "--json", str(tmp_path / "c.json")])
+    assert result.exit_code == 0, result.output
+    figures = json.loads((tmp_path / "c.json").read_text())
+    assert figures["ate_alignment"] == ("se3" if metric else "sim3")
+    assert (figures["ate_rmse_m"] > 0.1) is metric
+    assert ("sensors measure metres" in result.output) is metric
+    assert "cannot see metres" not in result.output + result.stderr
+
+
 def test_command_on_kitti_files(tmp_path: Path) -> None:
     truth, estimate = straight(251, 1.0), straight(251, 1.01)
     write_kitti(tmp_path / "a.txt", estimate)

@@ -384,7 +384,7 @@ def test_reset_forgets_the_gap(scene: Scene) -> None:
 class FakeMerging:
     """Joins with the first place in another map."""
 
-    def __init__(self, world: FakeMap, *_: object, fix_scale: bool, config: object) -> None:
+    def __init__(self, world: FakeMap, *_: object, fixes_scale: object, config: object) -> None:
         self.map = world
 
     def reset(self) -> None:
@@ -440,3 +440,21 @@ def test_a_reset_forgets_the_seam(joined: Scene) -> None:
     joined.closing.reset()
     joined.process(30)
     assert joined.calls.count("start adjustment") == 1
+
+
+def test_an_upright_map_of_one_camera_has_a_scale() -> None:
+    """With an IMU in both maps loops and merges keep the scale; without it in one they do not."""
+    upright = {1: True, 2: False}
+    slam_map = SimpleNamespace(
+        map_of=lambda keyframe: keyframe // 10, is_upright=lambda number: upright.get(number, False)
+    )
+    closing = object.__new__(LoopClosing)
+    closing._map = slam_map  # type: ignore[assignment]
+    for has_depth, keyframes, fixed in (
+        (False, (10, 11), True),
+        (False, (10, 20), False),
+        (False, (20, 21), False),
+        (True, (20, 21), True),
+    ):
+        closing._has_depth = has_depth
+        assert closing._fixes_scale(*keyframes) is fixed

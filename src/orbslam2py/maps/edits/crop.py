@@ -155,6 +155,16 @@ def keep_keyframes(
     numbers = map_numbers(contents.keyframes)
     maps = numbers[kept]
     parents, provisional = spanning_parents(keyframes, covisibility, maps)
+
+    def roots_now(roots: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(
+            sorted(
+                int(keyframes.ids[maps == number][0])
+                for number in numbers[np.isin(contents.keyframes.ids, roots)]
+                if (maps == number).any()
+            )
+        )
+
     cropped = replace(
         contents,
         keyframes=replace(keyframes, parent=parents, provisional_parent=provisional),
@@ -162,13 +172,8 @@ def keep_keyframes(
         observations=observations,
         covisibility=covisibility,
         loop_edges=contents.loop_edges[np.isin(contents.loop_edges, keyframes.ids).all(axis=1)],
-        metric_roots=tuple(
-            sorted(
-                int(keyframes.ids[maps == number][0])
-                for number in numbers[np.isin(contents.keyframes.ids, contents.metric_roots)]
-                if (maps == number).any()
-            )
-        ),
+        metric_roots=roots_now(contents.metric_roots),
+        upright_roots=roots_now(contents.upright_roots),
     )
     cropped = _select_points(cropped, np.isin(contents.points.ids, observations.point))
     root = int(keyframes.ids[0])
@@ -306,6 +311,7 @@ def _renumbered(contents: MapContents, root: int) -> MapContents:
         covisibility=Covisibility(new(edges.a), new(edges.b), edges.weight),
         loop_edges=new(contents.loop_edges),
         metric_roots=tuple(new(np.array(contents.metric_roots, np.int64)).tolist()),
+        upright_roots=tuple(new(np.array(contents.upright_roots, np.int64)).tolist()),
     )
 
 

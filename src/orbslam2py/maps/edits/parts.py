@@ -158,6 +158,7 @@ def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:
     # Taken alone the map had another root number, but the same order.
     root = int(contents.keyframes.ids[rows[0]])
     metric = {*contents.metric_roots} - {root} | ({root} if edited.metric_roots else set())
+    upright = {*contents.upright_roots} - {root} | ({root} if edited.upright_roots else set())
     points = np.searchsorted(contents.points.ids, edited.points.ids)
     return replace(
         saved,
@@ -166,6 +167,7 @@ def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:
             keyframes=_placed(contents.keyframes, rows, edited.keyframes, _PLACES_OF_KEYFRAMES),
             points=_placed(contents.points, points, edited.points, _PLACES_OF_POINTS),
             metric_roots=tuple(sorted(metric)),
+            upright_roots=tuple(sorted(upright)),
         ),
     )
 
@@ -268,6 +270,11 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
             root + by
             for part, by in zip(parts, keyframe[:-1].tolist(), strict=True)
             for root in part.metric_roots
+        ),
+        upright_roots=tuple(
+            root + by
+            for part, by in zip(parts, keyframe[:-1].tolist(), strict=True)
+            for root in part.upright_roots
         ),
     )
 

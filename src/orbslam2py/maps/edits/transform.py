@@ -14,6 +14,9 @@ from orbslam2py.maps.units import sees_metres
 from orbslam2py.trajectory import Similarity
 from orbslam2py.trajectory.rotations import inverse_poses
 
+#: Sine of the angle by which the third axis may turn in a map that stays upright: rounding.
+_LEANS = 1e-9
+
 
 def transform_map(
     contents: MapContents, similarity: Similarity, *, metric: bool = False
@@ -54,6 +57,7 @@ def transform_map(
     return replace(
         contents,
         metric_roots=_metric_roots(contents, scale, metric=metric),
+        upright_roots=contents.upright_roots if _stays_upright(similarity) else (),
         cameras=cameras.scaled(scale),
         keyframes=replace(moved, depth=depth, scale=scale * keyframes.scale),
         points=replace(
@@ -64,6 +68,11 @@ def transform_map(
             max_distance=scale * points.max_distance,
         ),
     )
+
+
+def _stays_upright(similarity: Similarity) -> bool:
+    """Whether only yaw and translation change."""
+    return similarity.scale == 1 and float(np.abs(similarity.R[:2, 2]).max()) < _LEANS
 
 
 def _metric_roots(contents: MapContents, scale: float, *, metric: bool) -> tuple[int, ...]:

@@ -82,6 +82,7 @@ def relocalisations_words(report: dict[str, Any]) -> str:
 ALIGNMENTS = {
     "se3": "turned and shifted",
     "sim3": "turned, shifted and scaled",
+    "yaw": "turned about the vertical and shifted",
     "none": "as it is",
 }
 
@@ -107,6 +108,10 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("ate_alignment", "alignment", "",
                "how the path was laid onto the truth; scaled only for one camera"),
         Figure("ate_scale", "scale", "", "factor of the alignment; 1 where nothing was scaled"),
+        Figure("ate_scaled_rmse_m", "ATE, scaled", "m",
+               "the same with a scaled path: one camera whose IMU knows metres", -1),
+        Figure("ate_scaled_scale", "scale of the scaled path", "",
+               "its factor: 1 where the metres of the IMU are right"),
         Figure("rpe_translation_rmse_m", "RPE, translation", "m",
                "error of the motion from one pose to the next", -1),
         Figure("rpe_rotation_rmse_deg", "RPE, rotation", "deg",

@@ -236,7 +236,9 @@ def _notes(report: dict[str, Any]) -> Markup | None:
         said.append(f"The errors are {compared_over(report)}: other maps are not in them.")
     if report.get("interrupted"):
         said.append(f"The run was interrupted after {_seen(report)}.")
-    if report.get("sensor") == "mono" and report.get("tracked") and not report.get("ate_scale"):
+    metric = (report.get("imu") or {}).get("metric", False)
+    own_unit = report.get("sensor") == "mono" and not metric
+    if own_unit and report.get("tracked") and not report.get("ate_scale"):
         said.append(
             "Lengths are in the map's own units: a single camera cannot see metres, and no ground "
             "truth tells them."

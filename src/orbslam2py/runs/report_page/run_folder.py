@@ -125,8 +125,9 @@ class RunFolder:
 
     @property
     def is_monocular(self) -> bool:
-        """Whether lengths are in the map's own unit."""
-        return self.report.get("sensor") == "mono"
+        """Whether lengths are in the map's own unit: one camera, without an IMU that scaled it."""
+        metric = (self.report.get("imu") or {}).get("metric", False)
+        return self.report.get("sensor") == "mono" and not metric
 
     @property
     def metres(self) -> float:

@@ -17,7 +17,9 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.slam.inertial.imu_buffer import ImuInterval
+from orbslam2py.slam.inertial.inertial_start import FIRST_BIAS, InertialStarter, KnownBefore
 from orbslam2py.slam.inertial.inertial_views import InertialViews
+from orbslam2py.slam.inertial_config import InertialConfig
 from orbslam2py.slam.records import (
     InertialState,
     PoseEstimate,
@@ -30,28 +32,10 @@ from orbslam2py.slam.state import Motion, State, Velocity
 
 _log = logging.getLogger(__name__)
 
-#: Seconds without a pose of an image that the IMU leads through.
-LONGEST = 5.0
-# ---- start ----
-_LEAST_VIEWS = 8
-_LEAST_SECONDS = 1.2
-#: Deviations of gravity's direction [rad] and of the scale's logarithm with which the IMU starts.
-_GRAVITY_KNOWN, _SCALE_KNOWN = 0.03, 0.03
-#: Weighted squared residual per degree of freedom beyond which IMU and camera do not fit.
-_MISFIT = 3.0
-#: Difference [m/s^2] of gravity's length from 9.81 that is allowed where it is estimated.
-_GRAVITY_OFF = 1.5
-#: Deviations of a bias before anything is known: gyro [rad/s], accelerometer [m/s^2].
-_FIRST_BIAS = (0.1, 0.2)
-#: Factor on the stated deviations of views, and their least values: rad, share of the position.
-_VIEW_FACTOR, _LEAST_TURN = 1.5, 2e-3
-# ---- filter ----
-#: Seconds in which the errors of map points are common to all images: together they count as one.
-_COMMON = 0.5
-#: Their errors in the image [rad], which no residual shows.
+#: Deviations of gravity [rad] and of the scale's logarithm in an upright map from a file.
+_LOADED = (0.01, 0.01)
+#: Errors of map points in the image [rad], which no residual shows.
 _OF_MAP = 1e-3
-#: Random walk of the logarithm of the scale of one camera's map [1/sqrt(s)].
-_SCALE_WALK = 2e-3
 #: Squared Mahalanobis distance (6 degrees of freedom) that one pose in a million exceeds.
 _FAR = 38.0
 #: Images in a row that contradict the IMU, after which it starts anew.
@@ -75,6 +59,8 @@ class InertialTracker:
         The unit of the map is the metre: with depth.
     idle : callable
         Whether nobody else works on the map.
+    config : InertialConfig
+        Thresholds.
     """
 
     def __init__(
@@ -84,6 +70,7 @@ class InertialTracker:
         *,
         metric: bool,
         idle: Callable[[], bool],
+        config: InertialConfig,
     ) -> None:
         self._map = slam_map
         self._T_cb = core.Pose.from_matrix(settings.T_ci)
@@ -92,13 +79,17 @@ class InertialTracker:
         )
         self._metric = metric
         self._idle = idle
+        self._limits = config
+        self._starter = InertialStarter(self._T_cb, self._noise, metric=metric, config=config)
         self._views = InertialViews()
         #: Samples, and velocities and biases at keyframes, for bundle adjustment.
         self.keyframes = core.InertialKeyframes(self._T_cb, self._noise)
         #: None: the IMU has not started.
         self.filter: core.InertialFilter | None = None
         #: Seconds of the last image whose pose is its own.
-        self._last_seen = -math.inf
+        self.last_seen = -math.inf
+        # Of the first image of those in a row that show enough, and that the IMU leads through.
+        self._shown_since = math.inf
         self._T_lw: core.Pose | None = None
         self._big_change = 0
         self._depth = 1.0
@@ -109,9 +100,13 @@ class InertialTracker:
         self._n_contradictions = 0
         self._new_view = False
         self._bias = np.zeros(6)
-        self._bias_deviations = _FIRST_BIAS
+        self._bias_deviations = FIRST_BIAS
         # Seconds of the image at which the map was last turned.
         self._aligned_at = -math.inf
+        # The state after the longest time without an image: it tells where another map begins.
+        self._adrift: core.InertialFilter | None = None
+        # Deviations of gravity [rad] and of the scale's logarithm in the maps that were turned.
+        self._known: dict[int, tuple[float, float]] = {}
         #: May the IMU be used at all; the check of the IMU takes it back.
         self.allowed = True
         #: May the IMU start; the check of the IMU allows it once it has found that the IMU fits.
@@ -139,14 +134,19 @@ class InertialTracker:
         usable = interval is not None and interval.is_complete and len(interval.samples) > 1
         self._samples = interval.samples if usable and interval is not None else None
         followed = state.phase is TrackingState.OK and state.motion.last_frame is not None
+        if self._samples is None or not self.allowed:
+            self._adrift = None
         if self._samples is None or not followed or not self.allowed:
             self.forget()
+            if self._adrift is not None and self._samples is not None:
+                self._adrift.predict(self._samples)
             return state
         state = state.following(self._map)
         motion = state.motion
         if motion.last.map_index != self._map_index:
             self.forget()
             self._map_index = motion.last.map_index
+        self._adrift = None
         if self.filter is None:
             state = self._start(state)
         if self.filter is None:
@@ -155,7 +155,8 @@ class InertialTracker:
         self._depth = state.motion.median_depth()
         state = self._realign(state)
         self.keyframes.add_samples(self._samples)
-        self.filter.predict(self._samples, 0.0 if self._metric else _SCALE_WALK)
+        walk = 0.0 if self._leads else self._limits.map_walk
+        self.filter.predict(self._samples, 0.0 if self._metric else walk, walk)
         T_cw, covariance = self.filter.pose()
         T_lw = state.motion.last.T_cw
         assert T_lw is not None
@@ -250,9 +251,7 @@ class InertialTracker:
             else:
                 self._n_contradictions += 1
             self._last_covariance = covariance
-        self._last_seen = frame.timestamp
-        self._T_lw = frame.T_cw
-        self._big_change = frame.big_change
+        self._take_over(frame)
         if self._n_contradictions >= _CONTRADICTIONS:
             _log.warning(
                 "the IMU contradicts %d images in a row; it starts anew (orbslam2py check-imu "
@@ -265,9 +264,9 @@ class InertialTracker:
         """Give a frame that was not found the predicted pose; None where the IMU cannot."""
         if self.filter is None or motion.last_frame is None:
             return None
-        if frame.timestamp - self._last_seen > LONGEST:
-            _log.info("the IMU has led for %.0f s without an image", LONGEST)
-            self.forget()
+        if frame.timestamp - self.last_seen > self._limits.longest:
+            _log.info("the IMU has led for %.0f s without an image", self._limits.longest)
+            self.end_of_map()
             return None
         T_cw, covariance = self.filter.pose()
         frame.clear_associations()
@@ -277,10 +276,77 @@ class InertialTracker:
         return PoseEstimate(method=PoseMethod.IMU, covariance=covariance)
 
     @property
+    def is_adrift(self) -> bool:
+        """Whether the IMU has led to where no image is known, and is still followed."""
+        return self._adrift is not None
+
+    def end_of_map(self) -> None:
+        """Stop leading; the state tells where another map begins."""
+        adrift = self.filter
+        self.forget()
+        self._adrift = adrift
+
+    def is_beyond_map(self, frame: core.TrackedFrame, shows_enough: bool) -> bool:
+        """Return whether what a frame shows is no part of the map, although it shows enough.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            One that the IMU leads through.
+        shows_enough : bool
+            Its features would do for the begin of a map.
+        """
+        self._shown_since = min(self._shown_since, frame.timestamp) if shows_enough else math.inf
+        return frame.timestamp - self._shown_since >= self._limits.beyond
+
+    def map_continued(self, frame: core.TrackedFrame) -> None:
+        """Go on from a frame at the predicted pose that became a keyframe.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame; its points are at places that follow from its pose.
+        """
+        assert self.filter is not None
+        self.filter.anchor()
+        self._take_over(frame)
+        self._last_covariance = None
+
+    @property
+    def pose_to_begin_at(self) -> core.Pose | None:
+        """``T_cw`` at which a map with depth begins after a loss; None: at the origin.
+
+        As long as the IMU knows roll and pitch; the map is then upright from its beginning. A
+        single camera's map becomes upright when the IMU starts in it.
+        """
+        adrift = self._adrift
+        if adrift is None or not self._metric:
+            return None
+        R = adrift.T_wb.rotation_matrix
+        covariance = R @ adrift.covariance[:3, :3] @ R.T
+        if np.linalg.eigvalsh(covariance[:2, :2])[-1] > self._limits.gravity_known**2:
+            return None
+        return adrift.pose()[0]
+
+    def map_begun(self, T_cw: core.Pose | None) -> None:
+        """Note where a map begins.
+
+        Parameters
+        ----------
+        T_cw : Pose or None
+            As `pose_to_begin_at` gave it.
+        """
+        self._adrift = None
+        if T_cw is not None:
+            index = self._map.active_map
+            self._map.set_upright(index)
+            self._known[index] = (self._limits.gravity_known, self._limits.scale_known)
+
+    @property
     def _leads(self) -> bool:
         """The image before had no pose of its own."""
         samples = self._samples
-        return samples is not None and bool(self._last_seen < samples[0, 0] - 1e-6)
+        return samples is not None and bool(self.last_seen < samples[0, 0] - 1e-6)
 
     def record(self) -> InertialState | None:
         """Return velocity and biases at the last image; None where the IMU has not started."""
@@ -306,18 +372,27 @@ class InertialTracker:
     def _of_image(self, covariance: FloatArray) -> FloatArray:
         """Covariance of a pose by an image for the filter, which takes each as independent."""
         samples = self._samples
-        seconds = _COMMON if samples is None else float(samples[-1, 0] - samples[0, 0])
+        seconds = 1.0 if samples is None else float(samples[-1, 0] - samples[0, 0])
         of_map = np.repeat([_OF_MAP, _OF_MAP * self._depth], 3) ** 2
-        return max(1.0, _COMMON / seconds) * (covariance + np.diag(of_map))
+        return max(1.0, self._limits.common / seconds) * (covariance + np.diag(of_map))
+
+    def reset(self) -> None:
+        """Forget all maps; what is known of the biases stays."""
+        self.forget()
+        self._adrift = None
+        self._known.clear()
+        self.keyframes.clear()
 
     def forget(self) -> None:
         """Drop the state; the biases are kept as what is known before the next start."""
         if self.filter is not None:
             self._bias = self.filter.bias
-            deviations = np.sqrt(np.diag(self.filter.covariance)[9:15])
+            deviations = np.sqrt(np.diag(self.filter.covariance)[9:18])
+            tilt = max(1e-3, float(deviations[6:8].max()))
+            self._known[self._map_index] = (tilt, max(1e-3, float(deviations[8])))
             self._bias_deviations = (
                 float(max(1e-3, deviations[:3].max())),
-                float(max(0.02, deviations[3:].max())),
+                float(max(0.02, deviations[3:6].max())),
             )
         self.filter = None
         self._T_lw = None
@@ -327,57 +402,40 @@ class InertialTracker:
 
     # ---- start -----------------------------------------------------------------------------------
     def _start(self, state: State) -> State:
-        views = self._views.views
-        due = (
-            self.may_start
-            and self._new_view
-            and len(views) >= _LEAST_VIEWS
-            and self._views.seconds >= _LEAST_SECONDS
-        )
+        due = self.may_start and self._new_view and self._starter.is_due(self._views)
         if not due or not self._idle():
             return state
         self._new_view = False
-        turn, place = np.median([view.deviations for view in views], axis=0)
-        start = core.estimate_inertial_start(
-            [view.timestamp for view in views],
-            [view.T_wc(self._map) for view in views],
-            [view.samples for view in views[1:]],
-            self._T_cb,
-            self._noise,
-            metric=self._metric,
-            rotation_deviation=max(_LEAST_TURN, _VIEW_FACTOR * turn),
-            position_deviation=max(1e-9, _VIEW_FACTOR * place),
-            bias=self._bias,
-            gyro_deviation=self._bias_deviations[0],
-            accel_deviation=self._bias_deviations[1],
-        )
-        if not _is_determined(start):
+        # In a map that was turned before, gravity and scale are known.
+        upright = self._map.is_upright(self._map_index)
+        gravity, scale = self._known.get(self._map_index, _LOADED) if upright else (0.0, 0.0)
+        known = KnownBefore(self._bias, self._bias_deviations, gravity, scale)
+        start = self._starter.estimate(self._views, self._map, known)
+        if start is None:
             return state
-        _log.info(
-            "IMU started after %.1f s: gravity to %.2f degrees, scale to %.1f %%",
-            self._views.seconds,
-            math.degrees(start.gravity_deviation),
-            100 * start.scale_deviation,
-        )
-        up, scale = start.up, start.scale
-        state = self._move_map(state, up, scale)
+        state = self._move_map(state, start.up, start.scale)
         T_cw = state.motion.last.T_cw
         assert T_cw is not None
         self.filter = core.InertialFilter(
             self._T_cb,
             self._noise,
             T_cw.inverse() @ self._T_cb,
-            up @ start.velocities[-1],
+            start.up @ start.velocities[-1],
             start.bias,
-            start.covariance,
+            self._starter.covariance(start, self._views.seconds),
         )
         self._aligned_at = state.motion.last.timestamp
-        self._last_seen = state.motion.last.timestamp
-        self._T_lw = T_cw
-        self._big_change = state.motion.last.big_change
+        self._take_over(state.motion.last)
         self._last_covariance = None
         self._views.clear()
         return state
+
+    def _take_over(self, last: core.TrackedFrame) -> None:
+        """Note the last frame with a pose of its own, as it is in the map."""
+        self.last_seen = last.timestamp
+        self._shown_since = math.inf
+        self._T_lw = last.T_cw
+        self._big_change = last.big_change
 
     def _move_map(self, state: State, up: core.Pose, scale: float) -> State:
         core.transform_map(self._map, self._map_index, scale, up)
@@ -414,14 +472,3 @@ def _differ(one: core.Pose, other: core.Pose) -> bool:
 def _is_strong(estimate: PoseEstimate) -> bool:
     evidence = estimate.evidence
     return evidence is not None and evidence.verdict is Verdict.STRONG
-
-
-def _is_determined(start: core.InertialStart) -> bool:
-    """Whether the data determine gravity and scale, and fit."""
-    return bool(
-        start.solved
-        and start.gravity_deviation < _GRAVITY_KNOWN
-        and start.scale_deviation < _SCALE_KNOWN
-        and start.cost < _MISFIT * start.freedom
-        and abs(start.gravity_length - 9.81) < _GRAVITY_OFF
-    )

@@ -58,7 +58,7 @@ class DepthInitializer(Initializer):
         """Return whether a frame has enough keypoints to begin a map."""
         return frame.features.size > self._least
 
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+    def try_initialize(self, frame: core.TrackedFrame, T_cw: core.Pose | None = None) -> Reason:
         """Make the frame the first keyframe, with points from its depths; or return a reason."""
         if not self.shows_enough(frame):
             return Reason.TOO_FEW_KEYPOINTS
@@ -67,7 +67,7 @@ class DepthInitializer(Initializer):
         # It may have been searched in other maps before.
         frame.take_over(core.TrackedFrame(frame.features))
         self._map.begin_map()
-        frame.T_cw = core.Pose()
+        frame.T_cw = T_cw or core.Pose()
         core.describe(frame.features, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=True, n_minimum=sys.maxsize)
         self._mapping.insert_keyframe(keyframe)

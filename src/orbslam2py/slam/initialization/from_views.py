@@ -151,7 +151,7 @@ class MonocularInitializer(Initializer):
         """Return whether a frame has enough keypoints to begin a map."""
         return frame.features.size > self._limits.keypoints
 
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+    def try_initialize(self, frame: core.TrackedFrame, T_cw: core.Pose | None = None) -> Reason:
         """Begin the map with this frame as second view; or return the reason why not."""
         if self._n_waiting == 0:
             self._waits_since = frame.timestamp

@@ -21,13 +21,16 @@ class Initializer(ABC):
         """Return whether a frame has enough keypoints to begin a map."""
 
     @abstractmethod
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+    def try_initialize(self, frame: core.TrackedFrame, T_cw: core.Pose | None = None) -> Reason:
         """Begin the map with this frame; or return a reason (`Reason.NONE`: it has begun).
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             The frame.
+        T_cw : Pose or None
+            The frame's pose in the new map, if an IMU knows it. A single camera, whose map has no
+            scale yet, does not use it.
         """
 
     @property

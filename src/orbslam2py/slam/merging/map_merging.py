@@ -31,6 +31,8 @@ _PLACES = 5  # in the other map, that are compared with the first
 Verify = Callable[[int, int], core.Loop | None]
 #: Keyframes of any map that look like one.
 FindAlike = Callable[[int], list[int]]
+#: Whether the maps of keyframes are in metres.
+FixesScale = Callable[..., bool]
 #: Keeps a keyframe alive; gives False when it is dead already.
 Lease = Callable[[int], AbstractContextManager[bool]]
 
@@ -48,8 +50,8 @@ class MapMerging:
         Keyframes that look like one and share no point with it.
     lease : callable
         Protects a keyframe from culling.
-    fix_scale : bool
-        Depth is measured: both maps have the same scale.
+    fixes_scale : callable
+        ``fixes_scale(*keyframes)``: their maps have the same scale, by depth or by an IMU.
     config : MergingConfig
         Limits.
     """
@@ -61,11 +63,11 @@ class MapMerging:
         find_alike: FindAlike,
         lease: Lease,
         *,
-        fix_scale: bool,
+        fixes_scale: FixesScale,
         config: MergingConfig,
     ) -> None:
         self._map = slam_map
-        self._fix_scale = fix_scale
+        self._fixes_scale = fixes_scale
         self._verify = verify
         self._find_alike = find_alike
         self._lease = lease
@@ -92,7 +94,7 @@ class MapMerging:
         """
         if not consistent:
             return None
-        best = core.choose_merge(self._map, list(consistent), self._fix_scale)
+        best = self._best_of(consistent)
         if best is None:
             return None
         with self._lease(best.matched) as alive:
@@ -116,7 +118,7 @@ class MapMerging:
         """Return whether no other place looks like either end."""
         here = self._map.map_of(best.current)
         elsewhere = [loop for loop in others if self._map.map_of(loop.matched) != here]
-        if core.choose_merge(self._map, [best, *elsewhere], self._fix_scale) is None:
+        if self._best_of([best, *elsewhere]) is None:
             return False
         same_map = [loop for loop in others if self._map.map_of(loop.matched) == here]
         if not all(self._is_drift(loop) for loop in same_map):
@@ -129,7 +131,12 @@ class MapMerging:
 
     def _is_drift(self, loop: core.Loop) -> bool:
         """Return whether two places of one map may be the same place, separated by drift."""
-        return bool(core.assess_drift(self._map, loop, self._fix_scale).plausible())
+        fix_scale = self._fixes_scale(loop.current)
+        return bool(core.assess_drift(self._map, loop, fix_scale).plausible())
+
+    def _best_of(self, loops: Sequence[core.Loop]) -> core.Loop | None:
+        fix_scale = self._fixes_scale(loops[0].current, *(loop.matched for loop in loops))
+        return core.choose_merge(self._map, list(loops), fix_scale)
 
     def _remember(self, best: core.Loop) -> None:
         self._shown[best.current] = (best.matched, best.S_cm)
@@ -214,7 +221,8 @@ class MapMerging:
         """
         self._map.update_connections(loop.current)
         with timer("plan"):
-            merge = core.plan_map_merge(self._map, loop, self._fix_scale)
+            fix_scale = self._fixes_scale(loop.current, loop.matched)
+            merge = core.plan_map_merge(self._map, loop, fix_scale)
         if merge.kept < 0 or cancelled.is_set():
             return None
         with timer("apply"):
@@ -252,12 +260,13 @@ class MapMerging:
     ) -> None:
         """Adjust both neighbourhoods together, and move the rest of the map with them."""
         slam_map = self._map
+        fix_scale = self._fixes_scale(current)
         before = core.poses_of_map(slam_map, map_index)
         seam = core.keyframes_of_seam(slam_map, current)
         with timer("weld"):
-            core.local_bundle_adjustment(slam_map, current, cancelled, not self._fix_scale)
+            core.local_bundle_adjustment(slam_map, current, cancelled, not fix_scale)
         with timer("graph"):
-            core.spread_from_seam(slam_map, before, seam.tolist(), self._fix_scale, cancelled)
+            core.spread_from_seam(slam_map, before, seam.tolist(), fix_scale, cancelled)
 
 
 def _parts(S_cw: FloatArray) -> tuple[float, FloatArray, FloatArray]:
