@@ -195,7 +195,7 @@ class System:
     # ---- tracking --------------------------------------------------------------------------------
     def track(
         self,
-        images: SomeImages | npt.NDArray[np.uint8] | Sequence[npt.NDArray[np.generic]],
+        images: SomeImages | npt.NDArray[np.uint8] | Sequence[Any],
         timestamp: float,
         *,
         mask: PairMask | None = None,
@@ -255,7 +255,8 @@ class System:
         first, second, own_mask = arrays_of(images, self.sensor, timestamp)
         chosen = own_mask if mask is None else mask
         if isinstance(self.pipeline.front_end, RigFrontEnd):
-            first = self.pipeline.front_end.mosaic(second or ())
+            cameras: Any = second
+            first = self.pipeline.front_end.mosaic(cameras)
 
         def build(frame_id: int, timer: StageTimer) -> core.Frame:
             return self.pipeline.build_frame(first, second, frame_id, timestamp, timer, chosen)
