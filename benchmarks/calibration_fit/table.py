@@ -27,8 +27,9 @@ from benchmarks.harness.tables import new_table
 from orbslam2py.calibration.self_calibration import Change
 from orbslam2py.datasets import Images
 from orbslam2py.runs.calibration_watch import CalibrationWatch
-from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings, builtin_settings
+from orbslam2py.settings import BUILTIN_NAMES, Settings, builtin_settings
 from orbslam2py.settings.builtin import builtin_sensors
+from orbslam2py.settings.sensor import WITHOUT_RIG
 
 PARTS = ("matrix", "right", "wrong")
 
@@ -73,7 +74,7 @@ def sequences() -> Iterator[tuple[str, orb.Sensor, object]]:
     """All real sequences, with every sensor they have images for."""
     folder = sequence_folder("")
     for path in sorted(Path(folder).iterdir()):
-        for sensor in Sensor:
+        for sensor in WITHOUT_RIG:
             try:
                 yield path.name, sensor, orb.open_sequence(path, sensor)
             except orb.OrbSlamError:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from orbslam2py.settings import Sensor
+from orbslam2py.settings.sensor import WITHOUT_RIG
 
-SENSORS = tuple(str(sensor) for sensor in Sensor)
+SENSORS = tuple(str(sensor) for sensor in WITHOUT_RIG)
 
 
 def new_parser(doc: str | None) -> argparse.ArgumentParser:

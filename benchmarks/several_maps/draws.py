@@ -27,7 +27,8 @@ from benchmarks.harness.tables import new_table, verdict
 from benchmarks.several_maps.cases import FPS
 from benchmarks.several_maps.pieces import Order, Pieces
 from benchmarks.several_maps.rows import Row, Rows, add_rows
-from orbslam2py import Sensor, System
+from orbslam2py import System
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 FEWEST, MOST = 2, 8  # pieces
@@ -49,7 +50,7 @@ def order_of(n: int, n_pieces: int, random: np.random.Generator) -> Order:
 def run(draw: int, frames: int | None) -> Row:
     """One draw, in this process."""
     n_pieces = FEWEST + draw % (MOST - FEWEST + 1)
-    sensor = list(Sensor)[draw % len(Sensor)]
+    sensor = WITHOUT_RIG[draw % len(WITHOUT_RIG)]
     threaded = draw % 2 == 1
     source = SyntheticSequence(
         SyntheticOptions(

@@ -94,7 +94,7 @@ def _differences(saved: Settings, present: Settings, where: str = "in the map") 
             continue
         before = getattr(getattr(saved, key.group), key.field)
         now = getattr(getattr(present, key.group), key.field)
-        if before != now and present.sensor in key.sensors:
+        if before != now and (present.sensor in key.sensors or present.rig is not None):
             # As it is written in the file: 0 or 1, not False or True.
             now, before = (int(v) if key.kind is bool else v for v in (now, before))
             yield f"{key.name} is {now}, {where} {before}"

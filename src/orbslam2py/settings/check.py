@@ -17,7 +17,7 @@ from orbslam2py.settings.opencv_yaml import scan
 from orbslam2py.settings.pair_views import LEAST_OVERLAP, views_of_pair
 from orbslam2py.settings.reader import groups_of_text, read_text
 from orbslam2py.settings.rig_file import is_rig_text, rig_of_text
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.sensor import WITHOUT_RIG, Sensor
 from orbslam2py.settings.settings import (
     Settings,
     builtin_settings,
@@ -73,8 +73,7 @@ class ChosenSettings:
         likely = self.likely_sensor
         if likely is Sensor.RIG:
             return (likely,) if _is_complete(self.text, self.choice, likely) else ()
-        pairs = [one for one in Sensor if one is not Sensor.RIG]
-        others = [one for one in pairs if one is Sensor.MONOCULAR or likely is Sensor.STEREO]
+        others = [one for one in WITHOUT_RIG if one is Sensor.MONOCULAR or likely is Sensor.STEREO]
         sensors = [likely, *(one for one in others if one is not likely)]
         return tuple(sensor for sensor in sensors if _is_complete(self.text, self.choice, sensor))
 

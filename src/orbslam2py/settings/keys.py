@@ -16,9 +16,9 @@ import numpy as np
 from orbslam2py._arguments import float_of, is_number, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.fisheye import FISHEYE_PARAMETERS
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.sensor import WITHOUT_RIG, Sensor
 
-_ALL = frozenset(Sensor)
+_ALL = frozenset(WITHOUT_RIG)
 _DEPTH_SENSORS = frozenset({Sensor.STEREO, Sensor.RGBD})
 _RGBD = frozenset({Sensor.RGBD})
 

@@ -42,7 +42,7 @@ from orbslam2py.settings.opencv_yaml import (
     scan,
 )
 from orbslam2py.settings.right_camera import SettingsGroups
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.sensor import WITHOUT_RIG, Sensor
 from orbslam2py.settings.translation import Translated, is_translated, translate
 from orbslam2py.settings.unknown_keys import problem_of_unknown_key, unused_keys
 
@@ -179,7 +179,7 @@ def _served_by(document: Document) -> list[Sensor]:
     required = [key for key in schema.KEYS if key.required]
     return [
         sensor
-        for sensor in Sensor
+        for sensor in WITHOUT_RIG
         if all(key.name in document.entries for key in required if sensor in key.sensors)
     ]
 

@@ -45,6 +45,10 @@ class Sensor(str, Enum, metaclass=_NamedByText):
         return self.value
 
 
+#: All but rigs, whose settings describe several cameras.
+WITHOUT_RIG = (Sensor.MONOCULAR, Sensor.STEREO, Sensor.RGBD)
+
+
 def _unknown(value: object) -> SettingsError:
     names = ", ".join(map(str, Sensor))
     return SettingsError(f"the sensor is {shown(value)}; give one of {names}")

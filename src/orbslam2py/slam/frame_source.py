@@ -132,7 +132,7 @@ def check_images(images: object, giver: str) -> None:
 
 
 def arrays_of(
-    images: SomeImages | npt.NDArray[np.uint8] | Sequence[npt.NDArray[np.generic]],
+    images: SomeImages | npt.NDArray[np.uint8] | Sequence[Any],
     sensor: Sensor,
     timestamp: float,
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[Any] | None, PairMask | None]:
@@ -171,7 +171,9 @@ def arrays_of(
                 f"the frame of {timestamp} s has one image; sensor 'rig' needs a sequence with one "
                 "for each camera, None for a camera that gave none"
             )
-        return next((one for one in images if one is not None), None), images, None  # type: ignore[return-value]
+        first: Any = next((one for one in images if one is not None), None)
+        rest: Any = images
+        return first, rest, None
     several: Any = images if isinstance(images, tuple | list) else (images,)
     wanted = 1 if sensor is Sensor.MONOCULAR else 2
     if len(several) != wanted:

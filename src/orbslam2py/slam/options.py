@@ -138,7 +138,9 @@ class Setup:
             sensor = settings.sensor if isinstance(settings, Settings) else None
             sensor = loaded.sensor if loaded is not None else sensor
         if sensor is None:
-            raise SettingsError("say what the images come from: sensor='mono', 'stereo' or 'rgbd'")
+            raise SettingsError(
+                "say what the images come from: sensor='mono', 'stereo', 'rgbd' or 'rig'"
+            )
         sensor = Sensor(sensor)
         if settings is None:
             if loaded is None:

@@ -133,7 +133,8 @@ class RigFrontEnd(FrontEnd):
         with timer("stereo"):
             context, active = self._context_of(pixels)
             self._check_of_rig.look(self._pairs, extractions, [g is not None for g in greys])
-            frames = [
+            # None, where a camera has no frame, is no type of the stubs.
+            frames: list[Any] = [
                 self._frame(i, frame_id, timestamp, extractions, pixels, depths) if used else None
                 for i, used in enumerate(active)
             ]

@@ -59,7 +59,7 @@ _log = logging.getLogger(__name__)
 
 
 class System:
-    """Visual SLAM for one camera, a stereo pair or an RGB-D camera.
+    """Visual SLAM for one camera, a stereo pair, an RGB-D camera or a rig of several cameras.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class System:
         ``"kitti04-12"``, ``"euroc"``...), or a YAML file of ORB-SLAM. Not needed with `load_map`: a
         map file contains its own.
     sensor : Sensor or str
-        ``"mono"``, ``"stereo"`` or ``"rgbd"``. Not needed with `load_map`.
+        ``"mono"``, ``"stereo"``, ``"rgbd"`` or ``"rig"``. Not needed with `load_map`.
     vocabulary : Vocabulary or path, optional
         Visual words; None: the vocabulary of the package.
     load_map : SavedMap, MapFile or path, optional
@@ -195,7 +195,7 @@ class System:
     # ---- tracking --------------------------------------------------------------------------------
     def track(
         self,
-        images: SomeImages | npt.NDArray[np.uint8] | Sequence[npt.NDArray[np.generic]],
+        images: SomeImages | npt.NDArray[np.uint8] | Sequence[Any],
         timestamp: float,
         *,
         mask: PairMask | None = None,
@@ -206,10 +206,11 @@ class System:
 
         Parameters
         ----------
-        images : array, sequence of two arrays, or images
+        images : array, sequence of arrays, or images
             One camera: the image. Stereo: left and right, synchronised; raw ones are rectified by
-            the settings. RGB-D: image and registered depth. Or `orbslam2py.datasets.Images` of a
-            sequence.
+            the settings. RGB-D: image and registered depth. Rig: one image for each camera in the
+            order of the settings, (image, depth) for a camera with depth images, and None for one
+            that gave nothing. Or `orbslam2py.datasets.Images` of a sequence.
 
             Images are uint8 (h, w), (h, w, 3) or (h, w, 4), grey or colour (order by ``Camera.RGB``
             of the settings). Depth is (h, w) of any number type; divided by ``DepthMapFactor`` it
@@ -217,7 +218,8 @@ class System:
         timestamp : float
             Seconds; must increase from call to call.
         mask : array of uint8 (h, w), or two of them (left, right), optional
-            No keypoints are taken where the mask is 0; one array serves both images of a pair.
+            No keypoints are taken where the mask is 0; one array serves both images of a pair. Of a
+            rig one mask, or None, for each camera.
         details : bool
             Also return the frame's keypoints and matches.
         imu : array of float64 (n, 7), optional
@@ -230,8 +232,9 @@ class System:
         Returns
         -------
         TrackingRecord
-            State and, if it is OK, the pose of the left or single camera. With one camera the unit
-            of length is the median depth of the first view. Before the map begins,
+            State and, if it is OK, the pose of the left or single camera, of a rig that of its
+            first one. With one camera the unit of length is the median depth of the first view.
+            Before the map begins,
             `TrackingRecord.reason` says what is missing.
 
         Raises
@@ -252,7 +255,8 @@ class System:
         first, second, own_mask = arrays_of(images, self.sensor, timestamp)
         chosen = own_mask if mask is None else mask
         if isinstance(self.pipeline.front_end, RigFrontEnd):
-            first = self.pipeline.front_end.mosaic(second or ())
+            cameras: Any = second
+            first = self.pipeline.front_end.mosaic(cameras)
 
         def build(frame_id: int, timer: StageTimer) -> core.Frame:
             return self.pipeline.build_frame(first, second, frame_id, timestamp, timer, chosen)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, Settings
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from support import fisheye_cameras
 from support import foreign_cameras as files
 from support.camera_files import written
@@ -57,7 +58,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     "text", [files.ROS2, files.OST, files.VINS_MONO, files.SIMPLE, files.OAK, files.zed("VGA")]
 )
-@pytest.mark.parametrize("sensor", list(Sensor))
+@pytest.mark.parametrize("sensor", WITHOUT_RIG)
 def test_what_is_written_is_read(
     command: CommandLine, tmp_path: Path, text: str, sensor: Sensor
 ) -> None:
@@ -307,7 +308,7 @@ def test_settings_that_are_given_as_calibration(command: CommandLine, tmp_path: 
         *(files.POLYCAM, files.FCA, files.SIMPLE, files.OPENCV_PAIR),
     ],
 )
-@pytest.mark.parametrize("sensor", list(Sensor))
+@pytest.mark.parametrize("sensor", WITHOUT_RIG)
 def test_calibration_given_as_settings(
     command: CommandLine, tmp_path: Path, text: str, sensor: Sensor
 ) -> None:

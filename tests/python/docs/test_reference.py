@@ -21,6 +21,7 @@ from orbslam2py.live import LiveStream
 from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.result import DROPPED
 from orbslam2py.settings import BUILTIN_NAMES, keys
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, ViewerSettings
 from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
@@ -55,7 +56,8 @@ def test_settings_page_lists_the_keys(heading: str) -> None:
     defaults = {field.name: field.default for field in dataclasses.fields(kind)}
     for row, key in zip(rows, known, strict=True):
         sensors = "" if not key.required else ", ".join(sorted(map(str, key.sensors), reverse=True))
-        assert row[3] == ("all" if len(key.sensors) == 3 and key.required else sensors), row
+        everywhere = key.required and len(key.sensors) == len(WITHOUT_RIG)
+        assert row[3] == ("all" if everywhere else sensors), row
         default = defaults[key.field]
         if key.required:
             assert row[2] == "", row

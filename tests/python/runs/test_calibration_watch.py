@@ -18,6 +18,7 @@ from orbslam2py.datasets import Images
 from orbslam2py.runs import RunOptions, SystemOptions, check_calibration
 from orbslam2py.runs.calibration_watch import N_IMAGES, CalibrationWatch
 from orbslam2py.settings import Misfit, OrbSettings, builtin_settings
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -81,7 +82,7 @@ def misfits(log: pytest.LogCaptureFixture) -> list[str]:
 
 
 # ---- what the images say -------------------------------------------------------------------------
-@pytest.mark.parametrize("sensor", Sensor)
+@pytest.mark.parametrize("sensor", WITHOUT_RIG)
 def test_the_right_calibration_is_not_told(sensor: Sensor) -> None:
     assert seen_with(sensor, 1.0) is None
 

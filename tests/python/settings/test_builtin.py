@@ -19,11 +19,12 @@ from orbslam2py.settings import (
     builtin_settings,
     resolve_settings,
 )
+from orbslam2py.settings.sensor import WITHOUT_RIG
 
 VARIANTS = [
     (name, sensor)
     for name in BUILTIN_NAMES
-    for sensor in Sensor
+    for sensor in WITHOUT_RIG
     if sensor is Sensor.MONOCULAR
     or sensor is (Sensor.RGBD if name.startswith("tum") else Sensor.STEREO)
 ]

@@ -20,6 +20,7 @@ from orbslam2py.settings import (
     ViewerSettings,
     builtin_settings,
 )
+from orbslam2py.settings.sensor import WITHOUT_RIG
 
 TUM = {
     "tum1": (
@@ -166,7 +167,7 @@ PUBLISHED = {
     **{
         (name, sensor): tum(name, sensor)
         for name in TUM
-        for sensor in Sensor
+        for sensor in WITHOUT_RIG
         if sensor is not Sensor.STEREO
     },
     **{(name, sensor): kitti(name, sensor) for name in KITTI for sensor in KITTI_VIEWERS},

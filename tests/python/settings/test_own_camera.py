@@ -19,6 +19,7 @@ from orbslam2py.settings import (
     settings_for_camera,
 )
 from orbslam2py.settings.check import read_choice
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from support.camera_files import KALIBR, KITTI, OPENCV, ROS, written
 from support.settings_files import DEPTH, MONO, refusal, write
 
@@ -176,7 +177,7 @@ def test_a_pipe_is_read_once(tmp_path: Path) -> None:
 
 
 # ---- other programs' files -----------------------------------------------------------------------
-@pytest.mark.parametrize("sensor", list(Sensor))
+@pytest.mark.parametrize("sensor", WITHOUT_RIG)
 @pytest.mark.parametrize(
     ("text", "whose"),
     [

@@ -24,6 +24,7 @@ from orbslam2py.settings import (
     StereoRectification,
     ViewerSettings,
 )
+from orbslam2py.settings.sensor import WITHOUT_RIG
 
 
 def number(low: float, high: float) -> st.SearchStrategy[float]:
@@ -80,7 +81,7 @@ def rectified_cameras(draw: st.DrawFn) -> CameraRectification:
 
 @st.composite
 def any_settings(draw: st.DrawFn) -> Settings:
-    sensor = draw(st.sampled_from(Sensor))
+    sensor = draw(st.sampled_from(WITHOUT_RIG))
     camera = draw(CAMERAS)
     factor = draw(number(1e-5, 1e9)) if sensor is Sensor.RGBD else None
     rectified = sensor is Sensor.STEREO and draw(st.booleans())

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, TrackingRecord
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from support.small_sequences import new_system, track
 
 pytestmark = pytest.mark.watchdog(30)
 
 
-@pytest.mark.parametrize("sensor", list(Sensor))
+@pytest.mark.parametrize("sensor", WITHOUT_RIG)
 def test_inliers_are_those_of_the_pose(sensor: Sensor) -> None:
     """Neither the points that a keyframe makes nor temporary ones change what was accepted."""
     records: list[TrackingRecord] = []

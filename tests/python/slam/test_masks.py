@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import ImageError, Sensor, System, TrackingRecord, TrackingState
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from support.feeding import feed
 from support.small_sequences import images, new_system
 
@@ -20,7 +21,7 @@ LEFT_HALF = EVERYTHING.copy()
 LEFT_HALF[:, : WIDTH // 2] = 0
 
 
-@pytest.fixture(params=list(Sensor))
+@pytest.fixture(params=WITHOUT_RIG)
 def sensor(request: pytest.FixtureRequest) -> Sensor:
     return Sensor(request.param)
 

@@ -20,6 +20,7 @@ from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
+from orbslam2py.settings.sensor import WITHOUT_RIG
 from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.state import LostSearch
@@ -37,7 +38,7 @@ def mapped(sensor: Sensor) -> MappedWorld:
     return MappedWorld(SyntheticSequence(options), range(N_MAPPED))
 
 
-@pytest.fixture(params=list(Sensor))
+@pytest.fixture(params=WITHOUT_RIG)
 def world(request: pytest.FixtureRequest) -> MappedWorld:
     """With mapping on, tracking lost."""
     world = mapped(request.param)

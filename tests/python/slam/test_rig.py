@@ -136,7 +136,7 @@ def test_extrinsics_the_wrong_way_round_are_told(caplog: pytest.LogCaptureFixtur
     right = mounted(0, (0.12, 0, 0))
     cameras = [RigCamera(WIDE), RigCamera(WIDE, right)]
     sequence, images = made_up(rig_settings(cameras), 11)
-    wrong = rig_settings([RigCamera(WIDE), RigCamera(WIDE, np.linalg.inv(right))])
+    wrong = rig_settings([RigCamera(WIDE), RigCamera(WIDE, np.asarray(np.linalg.inv(right)))])
     slam = orb.System(wrong, "rig", deterministic=True)
     for given, timestamp in zip(images, sequence.timestamps.tolist(), strict=True):
         slam.track(given, timestamp)
@@ -148,14 +148,15 @@ def test_refuses_images_that_do_not_belong_to_the_rig() -> None:
     settings = back_to_back()
     grey, depth = np.zeros((240, 320), np.uint8), np.ones((240, 320), np.uint16)
     slam = orb.System(settings, "rig", deterministic=True)
-    for images, named in (
+    wrong: list[tuple[Any, str]] = [
         ((grey,), "this rig has 2 cameras"),
         (grey, "a sequence with one for each camera"),
         ((None, None), "no image of any camera"),
         (((grey, depth), (grey[:200], depth)), "image of camera 2 is 320x200"),
         (((grey, depth), (grey, depth, depth)), "camera 2 has 3 images"),
         (((grey, depth), (grey, depth[:100])), "depth"),
-    ):
+    ]
+    for images, named in wrong:
         with pytest.raises(ImageError, match=named):
             slam.track(images, 0.0)
     with pytest.raises(StateError, match="sensor 'stereo'"):

@@ -16,7 +16,8 @@ def mounted(yaw: float, place: Sequence[float]) -> FloatArray:
     """``T_body_camera`` of a camera that is turned about the vertical [degrees, m]."""
     a = math.radians(yaw)
     T = np.eye(4)
-    T[:3, :3] = [[math.cos(a), 0, math.sin(a)], [0, 1, 0], [-math.sin(a), 0, math.cos(a)]]
+    c, s = math.cos(a), math.sin(a)
+    T[:3, :3] = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
     T[:3, 3] = place
     return T
 

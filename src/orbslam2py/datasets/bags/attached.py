@@ -6,6 +6,7 @@ from __future__ import annotations
 from orbslam2py.datasets.bags.bag import Bag
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
+from orbslam2py.settings.sensor import WITHOUT_RIG
 
 
 def attached_settings(bag: Bag, sensor: Sensor) -> Settings | None:
@@ -30,7 +31,7 @@ def attached_settings(bag: Bag, sensor: Sensor) -> Settings | None:
     SettingsError
         If they are wrong.
     """
-    for recorded in (sensor, *Sensor):
+    for recorded in (sensor, *WITHOUT_RIG):
         name = f"settings.{recorded}.yaml"
         text = bag.attachment(name)
         if text is None:
