@@ -29,5 +29,6 @@ class InertialConfig:
     measurement, s."""
     noise_factor: float = 4.0
     """Factor on the noise of the IMU in bundle adjustment with depth: errors of the map that no
-    residual shows would otherwise be forced upon the more exact depths. With one camera it is 1,
-    because the IMU holds the scale."""
+    residual shows would otherwise be forced upon the more exact depths."""
+    noise_factor_monocular: float = 2.0
+    """The same with one camera; less, because the IMU holds the scale."""
