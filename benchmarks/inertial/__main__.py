@@ -22,25 +22,27 @@ from rich.console import Console
 
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.tables import new_table
-from benchmarks.inertial.cases import SENSORS, SITUATIONS, Case, cases
+from benchmarks.inertial.cases import CHIPS, SENSORS, SITUATIONS, Case, cases
 from benchmarks.inertial.judgement import Row, rows_of
 
 _WORST_ROW = 1.05
 
 
-def _played(case: Case, config: Mapping[str, Any]) -> list[Row]:
+def _played(case: Case, chips: Sequence[str], config: Mapping[str, Any]) -> list[Row]:
     cv2.setNumThreads(1)
-    return rows_of(case, config)
+    return rows_of(case, chips, config)
 
 
-def _all(chosen: Sequence[Case], jobs: int, config: Mapping[str, Any]) -> Iterator[list[Row]]:
+def _all(
+    chosen: Sequence[Case], chips: Sequence[str], jobs: int, config: Mapping[str, Any]
+) -> Iterator[list[Row]]:
     if jobs == 1:
-        yield from (_played(case, config) for case in chosen)
+        yield from (_played(case, chips, config) for case in chosen)
         return
     # Not fork: the extension may have started threads.
     pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
     try:
-        for future in as_completed([pool.submit(_played, case, config) for case in chosen]):
+        for future in as_completed([pool.submit(_played, case, chips, config) for case in chosen]):
             yield future.result()
     finally:
         pool.shutdown(cancel_futures=True)
@@ -117,6 +119,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--sensors", nargs="+", choices=SENSORS, default=SENSORS, help="[all]")
     names = [one.name for one in SITUATIONS]
     parser.add_argument("--only", nargs="+", choices=names, default=[], help="situations [all]")
+    parser.add_argument("--chips", nargs="+", choices=CHIPS, default=CHIPS, help="IMUs [all]")
     parser.add_argument("--csv", type=Path, help="file for all rows")
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="threshold"
@@ -125,7 +128,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     config = dict(one.split("=", 1) for one in arguments.set)
     rows: list[Row] = []
     chosen = cases(arguments.only, arguments.sensors, arguments.seeds)
-    for number, found in enumerate(_all(chosen, arguments.jobs, config), 1):
+    for number, found in enumerate(_all(chosen, arguments.chips, arguments.jobs, config), 1):
         rows += found
         one = found[0]
         print(f"{number}/{len(chosen)} {one.situation}, {one.sensor}, {one.seed}", file=sys.stderr)

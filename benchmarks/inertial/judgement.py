@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from benchmarks.inertial.cases import CHIPS, Case
+from benchmarks.inertial.cases import Case
 from benchmarks.inertial.play import Run, play
 from orbslam2py._arrays import FloatArray
 from orbslam2py.synthetic import SyntheticSequence
@@ -40,13 +40,13 @@ class Row:
     fault: str
 
 
-def rows_of(case: Case, config: Mapping[str, Any] | None = None) -> list[Row]:
+def rows_of(case: Case, chips: Sequence[str], config: Mapping[str, Any] | None = None) -> list[Row]:
     """Play a case and judge each chip."""
-    without, *runs = play(case, CHIPS, config)
-    truth = SyntheticSequence(case.options(CHIPS[0])).ground_truth().T_wc[:, :3, 3]
+    without, *runs = play(case, chips, config)
+    truth = SyntheticSequence(case.options(chips[0])).ground_truth().T_wc[:, :3, 3]
     mono = case.sensor == "mono"
     rows = []
-    for chip, run in zip(CHIPS, runs, strict=True):
+    for chip, run in zip(chips, runs, strict=True):
         both = (run.map_index >= 0) & (without.map_index >= 0) & ~run.led
         rows.append(
             Row(
@@ -66,7 +66,7 @@ def rows_of(case: Case, config: Mapping[str, Any] | None = None) -> list[Row]:
                 run.up_error,
                 run.scale_error,
                 None if run.bias_errors is None else float(np.abs(run.bias_errors).max()),
-                tuple(run.nees.mean(axis=0)) if len(run.nees) else (),
+                tuple(run.nees.mean(axis=0).tolist()) if len(run.nees) else (),
                 run.fault,
             )
         )

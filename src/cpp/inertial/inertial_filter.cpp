@@ -63,7 +63,15 @@ void InertialFilter::predict(const std::vector<ImuSample>& samples, double scale
   covariance_.topLeftCorner<9, 9>() += noise;
   covariance_.block<6, 6>(kGyro, kGyro) += motion.bias_walk_covariance();
   covariance_(kScale, kScale) += scale_walk * scale_walk * dt;
-  covariance_.diagonal().segment<3>(kRotation).array() += rotation_walk * rotation_walk * dt;
+  // The map turns under the camera, and what is fixed to the world turns in it: velocity, gravity.
+  Eigen::Matrix<double, 8, 3> turn;
+  turn << R.transpose(), -skew(state_.velocity), Eigen::Matrix<double, 2, 3>::Identity();
+  const Eigen::Matrix<double, 8, 8> walk =
+      rotation_walk * rotation_walk * dt * turn * turn.transpose();
+  covariance_.topLeftCorner<6, 6>() += walk.topLeftCorner<6, 6>();
+  covariance_.block<6, 2>(0, kTilt) += walk.topRightCorner<6, 2>();
+  covariance_.block<2, 6>(kTilt, 0) += walk.bottomLeftCorner<2, 6>();
+  covariance_.block<2, 2>(kTilt, kTilt) += walk.bottomRightCorner<2, 2>();
   make_symmetric(covariance_);
 
   const Eigen::Vector3d position = state_.T_wb.translation() + dt * state_.velocity + further;

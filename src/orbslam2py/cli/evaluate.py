@@ -64,9 +64,9 @@ def evaluate(
     alignment: Annotated[
         Alignment,
         typer.Option(
-            help="se3 for metric estimates, sim3 for those of one camera, yaw for those with an IMU "
-            "if z is up in both worlds; auto takes what fits the run's sensor, or the lengths if "
-            "that is not known."
+            help="se3 for metric estimates, sim3 for those of one camera, yaw for those with an "
+            "IMU if z is up in both worlds; auto takes what fits the run's sensor, or the lengths "
+            "if that is not known."
         ),
     ] = Alignment.AUTO,
     file_format: Annotated[

@@ -175,11 +175,12 @@ def evaluate_trajectory(
         True poses of the same camera in any world.
     alignment
         ``se3`` for metric estimates, ``sim3`` for those of one camera, ``yaw`` for those with an
-        IMU if both worlds have the third axis up, ``none`` if both share one world. With ``sim3`` the relative errors are those of the scaled estimate. ``auto`` takes
-        ``sim3`` for a single camera and ``se3`` for others.
+        IMU if both worlds have the third axis up, ``none`` if both share one world. With ``sim3``
+        the relative errors are those of the scaled estimate. ``auto`` takes ``sim3`` for a single
+        camera and ``se3`` for others.
     single_camera
-        Whether the estimate is of one camera without depth or an IMU, for ``auto``. If it is not known, it is
-        assumed if lengths differ by a factor above 1.5 and scaling halves the error.
+        Whether the estimate is of one camera without depth or an IMU, for ``auto``. If it is not
+        known, it is assumed if lengths differ by a factor above 1.5 and scaling halves the error.
     max_difference
         Largest difference of matching time stamps [s].
     offset

@@ -74,7 +74,7 @@ def merging(monkeypatch: pytest.MonkeyPatch) -> MapMerging:
         yield maps.has_keyframe(keyframe)
 
     return MapMerging(
-        maps, verify, lambda keyframe: [], lease, fixes_scale=lambda *_: True, config=MergingConfig()
+        maps, verify, lambda _: [], lease, fixes_scale=lambda *_: True, config=MergingConfig()
     )  # type: ignore[arg-type]
 
 

@@ -62,7 +62,10 @@ class InertialStarter:
         self, T_cb: core.Pose, noise: FloatArray, *, metric: bool, config: InertialConfig
     ) -> None:
         self._T_cb = T_cb
-        self._noise = noise
+        # The axes of the map drift: that is as much noise of the gyro, and turns gravity (9.81
+        # m/s^2) in motions of about a second.
+        drift = np.array([config.map_walk, 9.81 * config.map_walk, 0.0, 0.0])
+        self._noise = np.hypot(noise, drift)
         self._metric = metric
         self._limits = config
 

@@ -83,7 +83,8 @@ class InertialTracker:
         self._starter = InertialStarter(self._T_cb, self._noise, metric=metric, config=config)
         self._views = InertialViews()
         #: Samples, and velocities and biases at keyframes, for bundle adjustment.
-        self.keyframes = core.InertialKeyframes(self._T_cb, self._noise)
+        factor = config.noise_factor if metric else config.noise_factor_monocular
+        self.keyframes = core.InertialKeyframes(self._T_cb, factor * self._noise)
         #: None: the IMU has not started.
         self.filter: core.InertialFilter | None = None
         #: Seconds of the last image whose pose is its own.
