@@ -19,7 +19,8 @@ constexpr std::size_t kChunk = 128;
 constexpr double kMostRows = 1.5;
 
 /// Most rows by which the two images of a pair may usually differ [pixels of the level]: where the
-/// rectification is worse than that, a column is no better than its parabola.
+/// rectification is worse than that, a column is no better than its parabola, and sightings that
+/// are aligned between frames bend the map by the same errors.
 constexpr float kMostRowError = 0.1F;
 /// Fewest keypoints that say something of the rows.
 constexpr std::size_t kFewestRows = 30;
@@ -79,7 +80,10 @@ int align_right_columns(Frame& frame, double bf, double max_disparity) {
                              images->right.levels[level], places[level]);
     }
   });
-  if (usual_row_error(aligned) > kMostRowError) return 0;
+  if (usual_row_error(aligned) > kMostRowError) {
+    frame.images->release();
+    return 0;
+  }
   frame.right_variance.assign(frame.size(), 0);
   int n_aligned = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {

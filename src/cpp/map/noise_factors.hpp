@@ -7,34 +7,37 @@
 
 namespace orbslam {
 
-/// A factor on standard deviations that follows what is measured, robust and slow: its logarithm is
-/// a running mean of the measured ones, the plain mean at first. Reading needs no lock; one thread
+/// Standard deviation of aligned sightings over that of corners of the same pyramid level. It begins
+/// at 1: a young map has to prove that its sightings agree better than corners. It follows what is
+/// measured slowly, as an exponential mean of the logarithm. Reading needs no lock; one thread
 /// writes.
 class NoiseFactor {
  public:
   double value() const { return value_.load(std::memory_order_relaxed); }
+  /// Inverse variance of an aligned sighting over that of a corner.
+  float weight() const { return static_cast<float>(1 / (value() * value())); }
   int n_measured() const { return n_.load(std::memory_order_relaxed); }
 
   /// Ignores numbers that are not finite or not above 0.
   void measure(double factor) {
     if (!(std::isfinite(factor) && factor > 0)) return;
-    const int n = std::min(n_.load(std::memory_order_relaxed) + 1, kMemory);
-    const double limited = std::clamp(factor, kLeast, kMost);
     const double old = std::log(value());
-    value_.store(std::exp(old + (std::log(limited) - old) / n), std::memory_order_relaxed);
-    n_.store(n, std::memory_order_relaxed);
+    const double measured = std::log(std::clamp(factor, kLeast, kMost));
+    value_.store(std::exp(old + (measured - old) / kMemory), std::memory_order_relaxed);
+    n_.store(n_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
+  /// Sets the value.
+  void assume(double factor) { value_.store(factor, std::memory_order_relaxed); }
   void forget() {
-    value_.store(kFirst, std::memory_order_relaxed);
+    assume(kMost);
     n_.store(0, std::memory_order_relaxed);
   }
 
  private:
-  static constexpr double kFirst = 2;  ///< before anything was measured
-  static constexpr int kMemory = 20;   ///< adjustments
-  static constexpr double kLeast = 0.3, kMost = 30;
+  static constexpr double kMemory = 20;  ///< adjustments
+  static constexpr double kLeast = 0.02, kMost = 1;
 
-  std::atomic<double> value_{kFirst};
+  std::atomic<double> value_{kMost};
   std::atomic<int> n_{0};
 };
 

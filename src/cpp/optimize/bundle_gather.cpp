@@ -12,12 +12,6 @@ std::uint32_t begin_point(GatheredBundle& bundle, const MapPoint& point) {
   return static_cast<std::uint32_t>(bundle.points.size() - 1);
 }
 
-/// Inverse variance of an aligned position, which is never taken for worse than a corner.
-float aligned_weight(double factor, float variance, float corner_weight) {
-  const double weight = 1 / (factor * factor * static_cast<double>(variance));
-  return std::max(corner_weight, static_cast<float>(weight));
-}
-
 void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t point,
                      const KeyFrame& keyframe, const Observation& observation,
                      const NoiseFactors& noise) {
@@ -32,16 +26,13 @@ void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t
   o.inverse_sigma2 = frame.scales->inverse_sigma2(keypoint.level);
   o.has_depth = observation.has_depth;
   auto kind = ObservationKind::kKeypoint;
-  const float corner = o.inverse_sigma2;
   if (const auto* a = keyframe.aligned_at(observation.index, bundle.points[point])) {
     o.u = a->u;
     o.v = a->v;
     o.right_u = a->right_u;
-    o.inverse_sigma2 = aligned_weight(noise.position.value(), a->variance, corner);
     const bool right = a->right_variance > 0;
-    const float right_weight =
-        right ? aligned_weight(noise.right.value(), a->right_variance, corner) : corner;
-    o.right_factor = right_weight / o.inverse_sigma2;
+    o.inverse_sigma2 *= noise.position.weight();
+    o.right_factor = (right ? noise.right.weight() : 1.0F) / noise.position.weight();
     kind = a->reference ? ObservationKind::kReference
            : right      ? ObservationKind::kAlignedRight
                         : ObservationKind::kAligned;
@@ -51,31 +42,21 @@ void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t
   bundle.kinds.push_back(kind);
 }
 
-/// Gives the reference sighting of the point that was added last the mean weight of those that were
-/// aligned to it: it is as exact as they are. Without any its corner counts as one.
-void weigh_reference(GatheredBundle& bundle, const Map& map) {
+/// The reference sighting of the point that was added last is as exact as those that were aligned
+/// to it. Without any it is a corner.
+void weigh_reference(GatheredBundle& bundle, const NoiseFactors& noise) {
   auto& observations = bundle.problem.observations;
-  const std::uint32_t point = static_cast<std::uint32_t>(bundle.points.size() - 1);
-  float sum = 0;
-  int n = 0;
+  const auto point = static_cast<std::uint32_t>(bundle.points.size() - 1);
+  bool is_alone = true;
   BundleProblem::Observation* reference = nullptr;
-  std::size_t i = observations.size();
-  for (; i > 0 && observations[i - 1].point == point; --i) {
-    auto& o = observations[i - 1];
-    if (bundle.kinds[i - 1] == ObservationKind::kReference) {
-      reference = &o;
-    } else if (bundle.kinds[i - 1] != ObservationKind::kKeypoint) {
-      sum += o.inverse_sigma2;
-      ++n;
-    }
+  for (std::size_t i = observations.size(); i > 0 && observations[i - 1].point == point; --i) {
+    const ObservationKind kind = bundle.kinds[i - 1];
+    if (kind == ObservationKind::kReference) reference = &observations[i - 1];
+    is_alone &= kind == ObservationKind::kReference || kind == ObservationKind::kKeypoint;
   }
-  if (reference == nullptr) return;
-  const std::size_t at = static_cast<std::size_t>(reference - observations.data());
-  const Frame& frame = *map.find(bundle.keyframes[reference->camera])->frame;
-  const float corner = frame.scales->inverse_sigma2(frame.keypoints[bundle.keypoints[at]].level);
-  const float right = reference->right_factor * reference->inverse_sigma2;
-  reference->inverse_sigma2 = n > 0 ? std::max(corner, sum / static_cast<float>(n)) : corner;
-  reference->right_factor = n > 0 ? right / reference->inverse_sigma2 : 1.0F;
+  if (reference == nullptr || !is_alone) return;
+  reference->inverse_sigma2 /= noise.position.weight();
+  reference->right_factor = 1;
 }
 
 }  // namespace
@@ -94,7 +75,7 @@ void GatheredBundle::add_point(const MapPoint& point, const Map& map) {
     add_observation(*this, camera->second, slot, *map.find(observation.keyframe), observation,
                     map.noise());
   }
-  weigh_reference(*this, map);
+  weigh_reference(*this, map.noise());
 }
 
 void GatheredBundle::add_points(const std::vector<const MapPoint*>& added, const Map& map) {
@@ -118,7 +99,7 @@ void GatheredBundle::add_points(const std::vector<const MapPoint*>& added, const
       if (at >= by_id.size() || by_id[at].keyframe == nullptr) continue;  // lower ones wrap around
       add_observation(*this, by_id[at].camera, slot, *by_id[at].keyframe, observation, map.noise());
     }
-    weigh_reference(*this, map);
+    weigh_reference(*this, map.noise());
   }
 }
 

@@ -40,14 +40,6 @@ std::vector<Sighting> sightings_of(const Map& map, const TrackedFrame& frame, st
   return chosen;
 }
 
-/// Inverse variance, never less than that of a corner. `noise`: as for align_frame().
-float weight_of(double noise, const NoiseFactor& measured, float variance, float corner) {
-  if (noise > 0) return std::max(corner, corner / static_cast<float>(noise * noise));
-  const double factor = measured.value();
-  return std::max(corner,
-                  static_cast<float>(1 / (factor * factor * static_cast<double>(variance))));
-}
-
 }  // namespace
 
 AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most, double noise) {
@@ -57,6 +49,9 @@ AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t mos
   if (!images || !frame.T_cw) return counts;
   const std::vector<Sighting> sightings = sightings_of(map, frame, most);
   frame.aligned.assign(f.size(), AlignedPixel());
+  const auto assumed = static_cast<float>(1 / (noise * noise));
+  const float weight = noise > 0 ? assumed : map.noise().position.weight();
+  const float right_weight = noise > 0 ? assumed : map.noise().right.weight();
   for (const Sighting& s : sightings) {
     const PointPatch& patch = *s.patch;
     const double z = (s.T_rw * frame.positions[s.slot]).z();
@@ -69,17 +64,14 @@ AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t mos
     ++counts[static_cast<std::size_t>(found.failure)];
     if (!found.ok()) continue;
     const Keypoint& keypoint = f.keypoints[s.slot];
-    const float corner = f.scales->inverse_sigma2(keypoint.level);
     AlignedPixel& pixel = frame.aligned[s.slot];
     pixel.point = frame.map_points[s.slot];
     pixel.u = found.u;
     pixel.v = found.v;
     pixel.right_u = f.right_u[s.slot] + (found.u - keypoint.x);
-    pixel.inverse_sigma2 = weight_of(noise, map.noise().position, found.variance, corner);
-    const float right = f.right_variance.empty() ? 0 : f.right_variance[s.slot];
-    const float right_weight =
-        right > 0 ? weight_of(noise, map.noise().right, right + found.variance, corner) : corner;
-    pixel.right_factor = right_weight / pixel.inverse_sigma2;
+    pixel.inverse_sigma2 = weight * f.scales->inverse_sigma2(keypoint.level);
+    const bool right = !f.right_variance.empty() && f.right_variance[s.slot] > 0;
+    pixel.right_factor = (right ? right_weight : 1.0F) / weight;
   }
   return counts;
 }

@@ -14,8 +14,11 @@
 namespace orbslam {
 namespace {
 
-/// Median of a chi-square distribution with one degree of freedom.
-constexpr double kMedianOfOne = 0.4549364;
+/// The noise is read off where this share of the residuals lies: the gates, which depend on it, must
+/// keep the sightings whose errors are systematic.
+constexpr double kShare = 0.9;
+/// Quantiles of the chi-square distribution at that share, by degrees of freedom.
+constexpr double kOfOne = 2.7055435, kOfTwo = 4.6051702;
 /// Sightings that a thread takes at a time.
 constexpr std::size_t kChunk = 64;
 /// Fewest residuals that say something of the noise.
@@ -132,17 +135,6 @@ void cut_missing_patches(Task& task) {
   }
 }
 
-/// Variances with which the factors in use give the assumed noise, if one is assumed.
-void assume(const NoiseFactors& factors, double noise, float corner, AlignedSighting& sighting) {
-  if (!(noise > 0)) return;
-  const auto variance_for = [&](const NoiseFactor& factor) {
-    const double deviation = noise / factor.value();
-    return static_cast<float>(deviation * deviation) * corner;
-  };
-  if (sighting.ok()) sighting.variance = variance_for(factors.position);
-  if (sighting.right_variance > 0) sighting.right_variance = variance_for(factors.right);
-}
-
 void align_one(const Task& task, Sighting& sighting) {
   const Point& point = task.points[sighting.point];
   if (!point.surface) return;
@@ -192,10 +184,11 @@ void commit(const Task& task, bool patches_only, Map& map) {
   }
 }
 
-double factor_of(std::vector<double>& squares, double lost) {
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return std::sqrt(*middle / kMedianOfOne * lost);
+double factor_of(std::vector<double>& squares, double quantile, double lost) {
+  const double index = kShare * static_cast<double>(squares.size() - 1);
+  const auto at = squares.begin() + static_cast<std::ptrdiff_t>(index);
+  std::nth_element(squares.begin(), at, squares.end());
+  return std::sqrt(*at / quantile * lost);
 }
 
 }  // namespace
@@ -203,6 +196,10 @@ double factor_of(std::vector<double>& squares, double lost) {
 KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bool patches_only,
                                   int n_threads) {
   KeyframeAlignment result;
+  if (noise > 0) {
+    map.noise().position.assume(noise);
+    map.noise().right.assume(noise);
+  }
   Task task = gather(map, current);
   if (task.sightings.empty()) return result;
   cut_missing_patches(task);
@@ -222,9 +219,7 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bo
                              if (task.sightings[i].is_new) align_one(task, task.sightings[i]);
                            }
                          });
-    for (Sighting& s : task.sightings) {
-      const Frame& frame = *task.views[s.view].frame;
-      assume(map.noise(), noise, frame.scales->sigma2(frame.keypoints[s.slot].level), s.result);
+    for (const Sighting& s : task.sightings) {
       if (s.is_new && s.result.point.valid()) ++result.counts[static_cast<std::size_t>(s.failure)];
     }
   }
@@ -245,21 +240,21 @@ void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
     const Eigen::Vector3d p = camera.T_cw * problem.points[o.point];
     Eigen::Vector2d error;
     if (!camera.model->error(p, o.u, o.v, error)) continue;
-    const double weight = o.inverse_sigma2;
-    squares.push_back(weight * error.x() * error.x());
-    squares.push_back(weight * error.y() * error.y());
+    const double corner = o.inverse_sigma2 / noise.position.weight();
+    squares.push_back(corner * error.squaredNorm());
     if (kind != ObservationKind::kAlignedRight || !o.has_depth) continue;
     const double right = camera.model->right_error(p, error, o.u, o.v, o.right_u);
-    right_squares.push_back(weight * static_cast<double>(o.right_factor) * right * right);
+    right_squares.push_back(corner * right * right);
   }
   const double n_free = static_cast<double>(problem.cameras.size()) - bundle.n_fixed();
   const double n_unknowns = 3 * static_cast<double>(problem.points.size()) + 6 * n_free;
   if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
   // The adjustment has taken so much of the noise into its unknowns.
   const double lost = n_residuals / (n_residuals - n_unknowns);
-  noise.position.measure(noise.position.value() * factor_of(squares, lost));
+  const double factor = factor_of(squares, kOfTwo, lost);
+  noise.position.measure(factor);
   if (right_squares.size() < kFewestResiduals) return;
-  noise.right.measure(noise.right.value() * factor_of(right_squares, lost));
+  noise.right.measure(factor_of(right_squares, kOfOne, lost));
 }
 
 }  // namespace orbslam

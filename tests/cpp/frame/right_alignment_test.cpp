@@ -85,6 +85,8 @@ TEST(AlignRightColumns, ColumnsStayWhereRowsDisagree) {
   EXPECT_EQ(align_right_columns(*frame, kBf, 200), 0);
   EXPECT_EQ(frame->right_u, before->right_u);
   EXPECT_TRUE(frame->right_variance.empty());
+  // No patch of a pair that is not rectified is aligned in any other frame.
+  EXPECT_EQ(frame->images->get(), nullptr);
 }
 
 TEST(AlignRightColumns, NothingHappensWithoutImages) {

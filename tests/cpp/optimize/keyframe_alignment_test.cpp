@@ -181,17 +181,24 @@ TEST(AlignKeyframes, TheAssumedNoiseGivesTheWeights) {
   EXPECT_GT(n_aligned, bundle.kinds.size() / 3);
 }
 
-TEST(NoiseFactor, FollowsMeasurementsSlowly) {
+TEST(NoiseFactor, BeginsAtACornerAndFollowsMeasurementsSlowly) {
   NoiseFactor noise;
-  noise.measure(3);
-  EXPECT_NEAR(noise.value(), 3, 1e-12);  // the first one counts alone
+  EXPECT_EQ(noise.value(), 1);
+  EXPECT_EQ(noise.weight(), 1);
   noise.measure(std::nan(""));
   noise.measure(-1);
-  EXPECT_EQ(noise.n_measured(), 1);
-  noise.measure(12);
-  EXPECT_NEAR(noise.value(), 6, 1e-9);  // the mean of the logarithms
+  EXPECT_EQ(noise.n_measured(), 0);
+  EXPECT_EQ(noise.value(), 1);
+  noise.measure(0.1);
+  EXPECT_NEAR(noise.value(), std::pow(0.1, 1 / 20.0), 1e-9);
+  for (int i = 0; i < 300; ++i) noise.measure(0.1);
+  EXPECT_NEAR(noise.value(), 0.1, 1e-5);
+  EXPECT_NEAR(noise.weight(), 100, 0.02);
+  for (int i = 0; i < 300; ++i) noise.measure(5);  // an aligned sighting is never worse
+  EXPECT_NEAR(noise.value(), 1, 1e-5);
   noise.forget();
   EXPECT_EQ(noise.n_measured(), 0);
+  EXPECT_EQ(noise.value(), 1);
 }
 
 }  // namespace
