@@ -13,8 +13,9 @@ import pytest
 
 import orbslam2py as orb
 from orbslam2py._timing import StageTimer
-from orbslam2py.errors import ImageError, StateError
+from orbslam2py.errors import ImageError, MapFileError, StateError
 from orbslam2py.evaluation import evaluate_trajectory
+from orbslam2py.maps import export_colmap, load_map, reprojection_errors
 from orbslam2py.settings import DepthSettings, OrbSettings, RigCamera, RightCamera, Settings
 from orbslam2py.slam.rig_front_end import RigFrontEnd
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -144,6 +145,10 @@ def test_found_again_and_loaded_again(tmp_path: Path) -> None:
     loaded.localization_mode = True
     record = loaded.track(images[5], times[5])
     assert record.T_wc is not None
+    saved = load_map(tmp_path / "rig.orbmap").contents
+    assert float(np.median(reprojection_errors(saved))) < 1
+    with pytest.raises(MapFileError, match=r"map of a rig.*ply"):
+        export_colmap(saved, tmp_path / "colmap")
     there = slam.trajectory().T_wc[slam.trajectory().timestamps.tolist().index(times[5])]
     assert np.abs(record.T_wc - there)[:3, 3].max() < 0.005
 
