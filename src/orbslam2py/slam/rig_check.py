@@ -44,9 +44,9 @@ class RigCheck:
         self, rig: Sequence[RigCamera], sources: Sequence[DepthSource], scales: core.ScalePyramid
     ) -> None:
         self._rig, self._sources, self._scales = rig, sources, scales
-        #: Keypoints, those with depth, and those with depth by the inverse extrinsics; by camera.
+        #: Frames, keypoints and those with depth, by camera.
         self._counts = {
-            i: np.zeros(4) for i, s in enumerate(sources) if s.partner is not None and s.active
+            i: np.zeros(3) for i, s in enumerate(sources) if s.partner is not None and s.active
         }
         self.warning: str | None = None
 
@@ -66,14 +66,14 @@ class RigCheck:
             if len(extractions[partner].keypoints) < _LEAST_KEYPOINTS:
                 continue
             counts = self._counts[i]
-            counts += 1, n, _n_depths(pair, extractions[i], extractions[partner], self._scales), 0
+            counts += 1, n, _n_depths(pair, extractions[i], extractions[partner], self._scales)
             if counts[0] < _FRAMES:
                 continue
             self._judge(i, partner, extractions)
 
     def _judge(self, i: int, partner: int, extractions: Sequence[core.Extraction]) -> None:
         counts = self._counts.pop(i)
-        frames, n, n_depths, _ = counts
+        frames, n, n_depths = counts
         if n_depths >= _LEAST_SHARE * overlap(self._rig[i], self._rig[partner]) * n:
             return
         inverse = self._inverse_pair(i, partner)
@@ -85,8 +85,9 @@ class RigCheck:
         )
         if by_inverse > _CLEARLY_MORE * max(n_depths / frames, 5):
             self.warning = (
-                f"{found}; by the inverse extrinsics it finds {by_inverse}: T_c1_c2 maps "
-                "coordinates of camera 2 into those of camera 1, give the inverse of what you have"
+                f"{found}; by the inverse extrinsics it finds {by_inverse}: Camera2.T_c1_c2 maps "
+                "coordinates of camera 2 into those of camera 1, and so on; give the inverse of "
+                "what you have"
             )
         else:
             self.warning = (

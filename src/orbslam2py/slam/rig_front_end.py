@@ -21,6 +21,9 @@ from orbslam2py.slam.rig_check import RigCheck
 
 _log = logging.getLogger(__name__)
 
+#: A camera with fewer keypoints sees nothing; images in a row after which a warning says so.
+_LEAST_KEYPOINTS, _BLIND_FRAMES = 10, 30
+
 
 class RigFrontEnd(FrontEnd):
     """Builds frames of the images of a rig.
@@ -47,6 +50,8 @@ class RigFrontEnd(FrontEnd):
         #: Frame contexts by the cameras that are active.
         self._contexts = {tuple(usual): core.FrameContext(self._camera_of_rig, self._scales)}
         self._told_missing: set[int] = set()
+        #: Images in a row without keypoints, by camera.
+        self._blind = [0] * len(rig)
         self._check_of_rig = RigCheck(rig, self._sources, self._scales)
 
     @property
@@ -131,7 +136,7 @@ class RigFrontEnd(FrontEnd):
                 greys, [None if g is None else m for g, m in zip(greys, allowed, strict=True)]
             )
         with timer("stereo"):
-            context, active = self._context_of(pixels)
+            context, active = self._context_of(self._seeing(extractions, pixels, timestamp))
             self._check_of_rig.look(self._pairs, extractions, [g is not None for g in greys])
             # None, where a camera has no frame, is no type of the stubs.
             frames: list[Any] = [
@@ -167,11 +172,29 @@ class RigFrontEnd(FrontEnd):
             core.sample_colours(frame, image, self._settings.camera.rgb)
         return frame
 
-    def _context_of(
-        self, pixels: list[ByteArray | None]
-    ) -> tuple[core.FrameContext, tuple[bool, ...]]:
-        """The context for the cameras that have images; a partner steps in for its camera."""
-        there = [image is not None for image in pixels]
+    def _seeing(
+        self,
+        extractions: list[core.Extraction],
+        pixels: list[ByteArray | None],
+        timestamp: float,
+    ) -> list[bool]:
+        """Whether each camera sees something; one that is covered counts as one without image."""
+        seeing = []
+        for i, (extraction, image) in enumerate(zip(extractions, pixels, strict=True)):
+            sees = len(extraction.keypoints) >= _LEAST_KEYPOINTS
+            self._blind[i] = 0 if sees or image is None else self._blind[i] + 1
+            if self._blind[i] == _BLIND_FRAMES and i not in self._told_missing:
+                self._told_missing.add(i)
+                _log.warning(
+                    "camera %d of the rig has seen nothing in %d images until %.3f s: is its lens "
+                    "covered? Tracking goes on with the others",
+                    *(i + 1, _BLIND_FRAMES, timestamp),
+                )
+            seeing.append(sees)
+        return seeing if any(seeing) else [image is not None for image in pixels]
+
+    def _context_of(self, there: list[bool]) -> tuple[core.FrameContext, tuple[bool, ...]]:
+        """The context for the cameras that see something; a partner steps in for its camera."""
         active = []
         for i, source in enumerate(self._sources):
             needed = source.active or not any(

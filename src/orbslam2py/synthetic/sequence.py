@@ -42,6 +42,7 @@ from orbslam2py.synthetic.lens_pair import LensPair, lens_pair_of
 from orbslam2py.synthetic.motions import Motion, SyntheticMotion
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.synthetic.pieces import arrange
+from orbslam2py.synthetic.rig_images import RigEffects, images_of_rig
 from orbslam2py.synthetic.scenes import LAPS, Corners, SyntheticWorld, make_scene
 from orbslam2py.synthetic.wide_view import WideView
 from orbslam2py.trajectory import Trajectory
@@ -212,7 +213,15 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         """
         T_wc = self.T_wc(index)
         if self._rig:
-            return self._images_of_rig(T_wc, index)
+            effects = RigEffects(
+                self._exposure(float(self.timestamps[index])),
+                self.options.noise,
+                self.options.seed,
+                self._seconds_on_way(index),
+                self._hand_rows(index),
+                dark=bool(self._arrangement.dark[index]),
+            )
+            return self._images_of_rig(T_wc, index, effects)
         left, depth = self._seen(T_wc, index, right=False)
         if self.sensor is Sensor.STEREO:
             return Images(left, right=self._seen(T_wc, index, right=True)[0])
@@ -225,25 +234,17 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
         rig = self.options.rig
         return () if rig is None or rig.rig is None else rig.rig
 
-    def _images_of_rig(self, T_wc: FloatArray, index: int) -> Images:
-        """Render the images of all cameras; only the first one can be covered."""
-        seconds, exposure = (
-            self._seconds_on_way(index),
-            self._exposure(float(self.timestamps[index])),
-        )
+    def _images_of_rig(self, T_wc: FloatArray, number: int, effects: RigEffects) -> Images:
         factor = self.default_settings().depth_factor
-        cameras: list[Any] = []
-        for k, (member, view) in enumerate(zip(self._rig, self._wide_views, strict=True)):
-            number = len(self._rig) * index + k
-            side = functools.partial(self._side, T_wc @ member.T_body_camera, seconds)
-            image, depth = view.render(side)
-            seed = [self.options.seed, number]
-            grey = lens.exposed(image, exposure, self.options.noise, seed)
-            rows = self._hand_rows(index) if k == 0 or self._arrangement.dark[index] else 0
-            grey, depth = lens.covered(grey, depth, min(rows, grey.shape[0]))
-            cameras.append((grey, self._measured(depth, number, factor)) if member.depth else grey)
-        first = cameras[0][0] if self._rig[0].depth else cameras[0]
-        return Images(first, cameras=tuple(cameras))
+        return images_of_rig(
+            self._rig,
+            self._wide_views,
+            lambda T_wk: functools.partial(self._side, T_wk, effects.seconds),
+            T_wc,
+            number,
+            effects,
+            lambda depth, own: self._measured(depth, own, factor),
+        )
 
     # ---- what only a made-up world knows ---------------------------------------------------------
     @property
@@ -321,6 +322,9 @@ class SyntheticSequence(SyntheticImu, FramesInOrder):
             As from `load`.
         """
         factor = self._exposure(None) if exposure is None else exposure
+        if self._rig:
+            effects = RigEffects(factor, self.options.noise, self.options.seed)
+            return self._images_of_rig(T_wc, number, effects)
         image, depth = self._render(self._left_of(T_wc), 2 * number, factor)
         if self.sensor is Sensor.STEREO:
             T_wr = self._right_of(T_wc)

@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 
 import orbslam2py as orb
-from orbslam2py.errors import ImageError, StateError
+from orbslam2py._timing import StageTimer
+from orbslam2py.errors import ImageError, MapFileError, StateError
 from orbslam2py.evaluation import evaluate_trajectory
+from orbslam2py.maps import export_colmap, load_map, reprojection_errors
 from orbslam2py.settings import DepthSettings, OrbSettings, RigCamera, RightCamera, Settings
+from orbslam2py.slam.rig_front_end import RigFrontEnd
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.rigs import WIDE, back_to_back, four_around, mounted, rig_settings, two_wide_pairs
 
@@ -92,6 +95,20 @@ def test_a_camera_that_drops_out_costs_its_points_alone(caplog: pytest.LogCaptur
     assert "camera 1 of the rig" in told[0]
 
 
+def test_a_covered_lens_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+    settings = two_wide_pairs()
+    _, (images,) = made_up(settings, 1)
+    front_end = RigFrontEnd(settings)
+    covered = (np.zeros_like(images[0]), *images[1:])
+    for i in range(35):
+        frame = front_end.rig(covered, i, 0.1 * i, StageTimer())
+        shown = {frame.camera.camera_at(float(x)) for x in frame.keypoints[:, 0]}
+        assert shown == {1, 2}  # the right camera of the front pair steps in
+    told = [text for text in caplog.messages if "lens covered" in text]
+    assert len(told) == 1
+    assert "camera 1 of the rig" in told[0]
+
+
 def test_a_bare_wall_before_the_front_pair_loses_the_pair_but_not_the_rig() -> None:
     settings = two_wide_pairs()
     assert settings.rig is not None
@@ -128,6 +145,10 @@ def test_found_again_and_loaded_again(tmp_path: Path) -> None:
     loaded.localization_mode = True
     record = loaded.track(images[5], times[5])
     assert record.T_wc is not None
+    saved = load_map(tmp_path / "rig.orbmap").contents
+    assert float(np.median(reprojection_errors(saved))) < 1
+    with pytest.raises(MapFileError, match=r"map of a rig.*ply"):
+        export_colmap(saved, tmp_path / "colmap")
     there = slam.trajectory().T_wc[slam.trajectory().timestamps.tolist().index(times[5])]
     assert np.abs(record.T_wc - there)[:3, 3].max() < 0.005
 

@@ -125,6 +125,11 @@ def align_sightings(
     """
     began = time.perf_counter()
     contents_of(contents)
+    if contents.cameras.has_rigs:
+        raise MapFileError(
+            "the sightings of a rig's map cannot be aligned in its images yet; optimize the map "
+            "without --align"
+        )
     if not is_whole(rounds) or rounds < 1:
         raise MapFileError(f"rounds is {shown(rounds)}; give a whole number of at least 1")
     slam_map = restore_contents(contents)
