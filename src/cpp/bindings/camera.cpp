@@ -216,9 +216,10 @@ void bind_camera(py::module_& module) {
                              "The camera is the left one of a fisheye pair.")
       .def_property_readonly("bf", &Camera::bf, "Baseline times fx [px m].")
       .def_property_readonly("baseline", &Camera::baseline, "Metres.")
-      .def_property_readonly("close_depth", [](const Camera& camera) { return camera.close_depth(); },
-                             "Depths below this [m] are trusted from one view; inf without a "
-                             "baseline.")
+      .def_property_readonly(
+          "close_depth", [](const Camera& camera) { return camera.close_depth(); },
+          "Depths below this [m] are trusted from one view; inf without a "
+          "baseline.")
       .def("right_column", &Camera::right_column, py::arg("u"), py::arg("z"),
            "Column in the (virtual) right image of a point at column u and depth z [m].")
       .def_property_readonly("pixels_per_radian", &Camera::pixels_per_radian,

@@ -110,8 +110,8 @@ RigMember member_of(const CameraOptions& own, const StoredMount& mount) {
     throw MapFileError("the rotation of a camera of a rig is no rotation");
   }
   try {
-    return {std::make_shared<Camera>(options),
-            Pose::from_unit(q, {mount[6], mount[7], mount[8]}), mount[1] != 0};
+    return {std::make_shared<Camera>(options), Pose::from_unit(q, {mount[6], mount[7], mount[8]}),
+            mount[1] != 0};
   } catch (const SettingsError& error) {
     throw MapFileError(std::string("a camera of a rig is impossible: ") + error.what());
   }

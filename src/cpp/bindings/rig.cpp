@@ -37,8 +37,10 @@ void bind_rig(py::module_& module) {
             return self.extract(pixels, allowed);
           },
           py::arg("images"), py::arg("masks"),
-          "Extractions of grey images (h, w) uint8, in their order; None gives an empty one. A mask "
-          "is None, or uint8 of the shape of its image with 0 where no keypoint may lie. One thread "
+          "Extractions of grey images (h, w) uint8, in their order; None gives an empty one. A "
+          "mask "
+          "is None, or uint8 of the shape of its image with 0 where no keypoint may lie. One "
+          "thread "
           "at a time.");
   module.def(
       "join_frames",

@@ -155,7 +155,8 @@ Camera::Camera(const CameraOptions& options)
       bounds_(rig_ ? bounds_of_rig(options_) : bounds_of(*this)) {
   if (rig_) {
     close_depth_ = deepest_close(options_.members);
-  } else if (has_baseline()) close_depth_ = options_.bf * options_.depth_ratio / options_.pinhole.fx;
+  } else if (has_baseline())
+    close_depth_ = options_.bf * options_.depth_ratio / options_.pinhole.fx;
 }
 
 bool Camera::project_wide(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const {

@@ -55,10 +55,11 @@ struct CameraOptions {
   std::vector<RigMember> members;
 };
 
-/// Linear forms q = B (p; 1) that compare a point p in the camera frame with one keypoint: the error
-/// of its projection in raw pixels is (q.x, q.y) / q.z, exact for a pinhole and to first order
-/// around the keypoint for other lenses. q.z is positive in front, that is within 90 degrees of the
-/// keypoint's ray or of a pinhole's axis. The last column is zero but for the cameras of a rig.
+/// Linear forms q = B (p; 1) that compare a point p in the camera frame with one keypoint: the
+/// error of its projection in raw pixels is (q.x, q.y) / q.z, exact for a pinhole and to first
+/// order around the keypoint for other lenses. q.z is positive in front, that is within 90 degrees
+/// of the keypoint's ray or of a pinhole's axis. The last column is zero but for the cameras of a
+/// rig.
 ///
 /// Its disparity is bf / q.z, and B.row(0) points along the epipolar curve in the direction in
 /// which the right camera of a pair sees it (docs/method/frame.md#depth-of-a-sight).
@@ -71,7 +72,8 @@ inline Eigen::Vector3d apply(const Sight& B, const Eigen::Vector3d& p) {
 
 /// Number k of a sight as the solvers store it: rows of three, then the last column.
 inline double sight_entry(const Sight& B, std::size_t k) {
-  return k < 9 ? B(static_cast<int>(k / 3), static_cast<int>(k % 3)) : B(static_cast<int>(k - 9), 3);
+  return k < 9 ? B(static_cast<int>(k / 3), static_cast<int>(k % 3))
+               : B(static_cast<int>(k - 9), 3);
 }
 
 /// A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual) right

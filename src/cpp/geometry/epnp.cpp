@@ -72,7 +72,8 @@ Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pix
                                             const Camera& camera) {
   Eigen::Matrix<double, 12, 12> normal = Eigen::Matrix<double, 12, 12>::Zero();
   for (Eigen::Index i = 0; i < pixels.cols(); ++i) {
-    const Eigen::Matrix<double, 2, 3> rows = camera.sight(pixels(0, i), pixels(1, i)).topLeftCorner<2, 3>();
+    const Eigen::Matrix<double, 2, 3> rows =
+        camera.sight(pixels(0, i), pixels(1, i)).topLeftCorner<2, 3>();
     const Eigen::Matrix3d product = rows.transpose() * rows;
     for (int a = 0; a < 4; ++a) {
       for (int b = 0; b <= a; ++b) {

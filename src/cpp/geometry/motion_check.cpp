@@ -90,8 +90,9 @@ MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (!inliers[i]) continue;
     const auto k = static_cast<Eigen::Index>(i);
-    const Judgement judgement = judge(cameras, camera.sight(pairs.u_1[k], pairs.v_1[k]).leftCols<3>(),
-                                      camera.sight(pairs.u_2[k], pairs.v_2[k]).leftCols<3>(), max_squared_error);
+    const Judgement judgement =
+        judge(cameras, camera.sight(pairs.u_1[k], pairs.v_1[k]).leftCols<3>(),
+              camera.sight(pairs.u_2[k], pairs.v_2[k]).leftCols<3>(), max_squared_error);
     if (!judgement.good) continue;
     support.points[i] = judgement.point;
     support.good[i] = 1;

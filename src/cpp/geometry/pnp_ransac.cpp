@@ -82,7 +82,8 @@ std::vector<std::size_t> PnpRansac::draw_of_rig() {
 std::optional<PnpPose> PnpRansac::pose_of(const std::vector<std::size_t>& chosen) const {
   const Camera& rig = *problem_.camera;
   const auto n = static_cast<Eigen::Index>(chosen.size());
-  const std::size_t camera = rig.camera_at(problem_.pixels(0, static_cast<Eigen::Index>(chosen[0])));
+  const std::size_t camera =
+      rig.camera_at(problem_.pixels(0, static_cast<Eigen::Index>(chosen[0])));
   const Eigen::Vector2d corner(rig.column_of(camera), 0);
   Eigen::Matrix3Xd points(3, n);
   Eigen::Matrix2Xd pixels(2, n);

@@ -55,9 +55,7 @@ struct KeyFrame {
 
   Eigen::Vector3d center() const { return T_cw.center(); }
   /// Of the camera that shows a keypoint, in the world; differs from center() for a rig.
-  Eigen::Vector3d center_of(std::size_t keypoint) const {
-    return frame->center_of(keypoint, T_cw);
-  }
+  Eigen::Vector3d center_of(std::size_t keypoint) const { return frame->center_of(keypoint, T_cw); }
 };
 
 }  // namespace orbslam

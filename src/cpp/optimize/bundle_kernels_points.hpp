@@ -28,8 +28,8 @@ inline void compare(const Observations& o, Size i, const Lanes (&p)[3], Sight& s
   Lanes q[3];
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) s.B[row][k] = load(o.sight[3 * row + k] + i);
-    q[row] = s.B[row][0] * p[0] + (s.B[row][1] * p[1] + s.B[row][2] * p[2]) +
-             load(o.sight[9 + row] + i);
+    q[row] =
+        s.B[row][0] * p[0] + (s.B[row][1] * p[1] + s.B[row][2] * p[2]) + load(o.sight[9 + row] + i);
   }
   const Lanes tiny2 = all(kTinyDepth * kTinyDepth);
   const Lanes weight_u = load(o.weight_u + i), weight_right = load(o.weight_right + i);

@@ -20,11 +20,11 @@ struct Group {
   std::vector<double> x, y, z;        ///< world
   std::vector<double> u, v, right_u;  ///< pixels; right_u only in the group with depth
   std::vector<double> inverse_sigma2;
-  std::vector<double> right_factor;          ///< inverse variance of the right column over that
-  std::vector<double> weight;                ///< inverse_sigma2 of those in use, 0 of the others
+  std::vector<double> right_factor;  ///< inverse variance of the right column over that
+  std::vector<double> weight;        ///< inverse_sigma2 of those in use, 0 of the others
   /// By rows of three, then the last column; empty for a pinhole.
   std::array<std::vector<double>, 12> sight;
-  std::vector<std::size_t> slot;             ///< position in the caller's list
+  std::vector<std::size_t> slot;  ///< position in the caller's list
 
   std::size_t size() const { return slot.size(); }
   void clear();

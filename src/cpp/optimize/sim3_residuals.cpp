@@ -27,7 +27,8 @@ std::optional<Residual> residual(const Eigen::Vector3d& p_c,
   const Eigen::Vector2d predicted = q.head<2>() * inverse_q;
   Residual result;
   result.error = -weight * predicted;
-  result.jacobian = -weight * inverse_q * (B.topLeftCorner<2, 3>() - predicted * B.row(2).head<3>()) * derivative;
+  result.jacobian =
+      -weight * inverse_q * (B.topLeftCorner<2, 3>() - predicted * B.row(2).head<3>()) * derivative;
   result.depth = q.z();
   return result;
 }

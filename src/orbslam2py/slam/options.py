@@ -149,7 +149,9 @@ class Setup:
         if loaded is not None:
             check_sensor(loaded, sensor)
         given, settings = settings, resolve_settings(settings, sensor)
-        if imu is None and not isinstance(given, Settings):
+        if sensor is Sensor.RIG and imu is not None:
+            raise SettingsError("a rig uses no IMU yet; leave imu out, or track one camera with it")
+        if imu is None and sensor is not Sensor.RIG and not isinstance(given, Settings):
             imu = imu_of_settings_file(Path(given))
         words = (
             vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)

@@ -55,7 +55,8 @@ TEST(RigExtractor, GivesWhatOneExtractorGivesForEachImage) {
   cv::Mat image(240, 320, CV_8UC1);
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {
-      image.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(((u / 13) * 37 + (v / 11) * 61) % 251);
+      image.at<std::uint8_t>(v, u) =
+          static_cast<std::uint8_t>(((u / 13) * 37 + (v / 11) * 61) % 251);
     }
   }
   const cv::Mat part = image.colRange(0, 200).clone();

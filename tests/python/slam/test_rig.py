@@ -13,7 +13,7 @@ import pytest
 
 import orbslam2py as orb
 from orbslam2py._timing import StageTimer
-from orbslam2py.errors import ImageError, MapFileError, StateError
+from orbslam2py.errors import ImageError, MapFileError, SettingsError, StateError
 from orbslam2py.evaluation import evaluate_trajectory
 from orbslam2py.maps import export_colmap, load_map, reprojection_errors
 from orbslam2py.settings import DepthSettings, OrbSettings, RigCamera, RightCamera, Settings
@@ -183,3 +183,5 @@ def test_refuses_images_that_do_not_belong_to_the_rig() -> None:
     with pytest.raises(StateError, match="sensor 'stereo'"):
         slam.track_stereo(grey, grey, 0.0)
     assert len(slam.trajectory().timestamps) == 0
+    with pytest.raises(SettingsError, match="a rig uses no IMU yet"):
+        orb.System(settings, "rig", imu="imu.yaml")
