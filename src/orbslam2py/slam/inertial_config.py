@@ -27,8 +27,6 @@ class InertialConfig:
     common: float = 0.5
     """The errors of map points are common to images within this time: together these count as one
     measurement, s."""
-    noise_factor: float = 4.0
-    """Factor on the noise of the IMU in bundle adjustment with depth: errors of the map that no
-    residual shows would otherwise be forced upon the more exact depths."""
-    noise_factor_monocular: float = 2.0
-    """The same with one camera; less, because the IMU holds the scale."""
+    noise_factor: float = 2.0
+    """Factor on the noise of the IMU in bundle adjustment of one camera's map: it holds the scale.
+    With depth the drift of the map is added to the noise instead."""
