@@ -31,4 +31,4 @@ class InertialConfig:
     common: ClassVar[float] = 0.5
     #: Factor on the noise of the IMU in bundle adjustment of one camera's map, whose scale it
     #: holds. With depth the drift of the map is added to the noise instead.
-    noise_factor: ClassVar[float] = 2.0
+    noise_factor: ClassVar[float] = 8.0
