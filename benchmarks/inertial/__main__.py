@@ -10,42 +10,19 @@ from __future__ import annotations
 import csv
 import dataclasses
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
 from rich.console import Console
 
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.tables import new_table
-from benchmarks.inertial.cases import CHIPS, SENSORS, SITUATIONS, Case, cases
-from benchmarks.inertial.judgement import Row, rows_of
+from benchmarks.inertial.cases import CHIPS, SENSORS, SITUATIONS, cases
+from benchmarks.inertial.judgement import Row
+from benchmarks.inertial.runs import all_rows
 
 _WORST_ROW = 1.05
-
-
-def _played(case: Case, chips: Sequence[str], config: Mapping[str, Any]) -> list[Row]:
-    cv2.setNumThreads(1)
-    return rows_of(case, chips, config)
-
-
-def _all(
-    chosen: Sequence[Case], chips: Sequence[str], jobs: int, config: Mapping[str, Any]
-) -> Iterator[list[Row]]:
-    if jobs == 1:
-        yield from (_played(case, chips, config) for case in chosen)
-        return
-    # Not fork: the extension may have started threads.
-    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
-    try:
-        for future in as_completed([pool.submit(_played, case, chips, config) for case in chosen]):
-            yield future.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def geometric_mean(values: Sequence[float]) -> float:
@@ -128,7 +105,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     config = dict(one.split("=", 1) for one in arguments.set)
     rows: list[Row] = []
     chosen = cases(arguments.only, arguments.sensors, arguments.seeds)
-    for number, found in enumerate(_all(chosen, arguments.chips, arguments.jobs, config), 1):
+    for number, found in enumerate(all_rows(chosen, arguments.chips, arguments.jobs, config), 1):
         rows += found
         one = found[0]
         print(f"{number}/{len(chosen)} {one.situation}, {one.sensor}, {one.seed}", file=sys.stderr)

@@ -14,7 +14,6 @@ from rich.console import Console
 from rich.table import Table
 
 from orbslam2py.errors import SettingsError
-from orbslam2py.slam import config as configuration
 from orbslam2py.slam.config import PRESETS, Config, all_values, value_of
 
 EXAMPLE = """
@@ -55,17 +54,16 @@ def _is_of(full: str, name: str | None) -> bool:
 
 def descriptions() -> dict[str, str]:
     """Return what each value means, by its name with a dot: the docstrings of the fields."""
-    classes = {
-        node.name: node
-        for node in ast.parse(inspect.getsource(configuration)).body
-        if isinstance(node, ast.ClassDef)
-    }
     found = {}
     for section in fields(Config):
         kind: Any = type(getattr(Config(), section.name))
-        body = classes[kind.__name__].body
-        for field, text in itertools.pairwise(body):
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+        (definition,) = ast.parse(inspect.getsource(kind)).body
+        assert isinstance(definition, ast.ClassDef)
+        names = {one.name for one in fields(kind)}
+        for field, text in itertools.pairwise(definition.body):
+            if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
+                continue
+            if field.target.id in names:
                 said = text.value.value if _is_text(text) else ""  # type: ignore[attr-defined]
                 found[f"{section.name}.{field.target.id}"] = " ".join(str(said).split())
     return found

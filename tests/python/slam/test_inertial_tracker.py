@@ -191,7 +191,7 @@ def test_darkness_on_the_way_leaves_one_upright_map(tmp_path: Any) -> None:
     down = sequence.ground_truth().T_wc[-1, :3, :3].T @ [0, 1, 0]
     assert records[-1].T_wc is not None
     lean = records[-1].T_wc[:3, :3] @ down - [0, 0, -1]
-    assert np.linalg.norm(lean) < np.radians(1.0)
+    assert np.linalg.norm(lean) < np.radians(2.0)
     saved = load_map(tmp_path / "a.orbmap")
     assert saved.contents.upright_roots == (0,)
     with System(settings, "rgbd", load_map=saved, deterministic=True) as again:

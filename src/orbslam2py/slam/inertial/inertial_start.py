@@ -43,6 +43,23 @@ class KnownBefore:
     """Deviation of the logarithm of the scale; 0: not known."""
 
 
+def with_drift(noise: FloatArray, config: InertialConfig) -> FloatArray:
+    """Add the drift of a map to the noise of an IMU.
+
+    The axes of the map turn as a random walk: that is as much noise of the gyro, and turns gravity
+    (9.81 m/s^2) in motions of about a second.
+
+    Parameters
+    ----------
+    noise : array of float64, (4,)
+        As of `InertialFilter`.
+    config : InertialConfig
+        Thresholds.
+    """
+    drift = np.array([config.map_walk, 9.81 * config.map_walk, 0.0, 0.0])
+    return np.hypot(noise, drift)
+
+
 class InertialStarter:
     """Estimates the state of an IMU from views.
 
@@ -62,10 +79,7 @@ class InertialStarter:
         self, T_cb: core.Pose, noise: FloatArray, *, metric: bool, config: InertialConfig
     ) -> None:
         self._T_cb = T_cb
-        # The axes of the map drift: that is as much noise of the gyro, and turns gravity (9.81
-        # m/s^2) in motions of about a second.
-        drift = np.array([config.map_walk, 9.81 * config.map_walk, 0.0, 0.0])
-        self._noise = np.hypot(noise, drift)
+        self._noise = with_drift(noise, config)
         self._metric = metric
         self._limits = config
 

@@ -17,7 +17,12 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.imu import ImuSettings
 from orbslam2py.slam.inertial.imu_buffer import ImuInterval
-from orbslam2py.slam.inertial.inertial_start import FIRST_BIAS, InertialStarter, KnownBefore
+from orbslam2py.slam.inertial.inertial_start import (
+    FIRST_BIAS,
+    InertialStarter,
+    KnownBefore,
+    with_drift,
+)
 from orbslam2py.slam.inertial.inertial_views import InertialViews
 from orbslam2py.slam.inertial_config import InertialConfig
 from orbslam2py.slam.records import (
@@ -83,8 +88,10 @@ class InertialTracker:
         self._starter = InertialStarter(self._T_cb, self._noise, metric=metric, config=config)
         self._views = InertialViews()
         #: Samples, and velocities and biases at keyframes, for bundle adjustment.
-        factor = config.noise_factor if metric else config.noise_factor_monocular
-        self.keyframes = core.InertialKeyframes(self._T_cb, factor * self._noise)
+        noise = config.noise_factor * self._noise
+        self.keyframes = core.InertialKeyframes(
+            self._T_cb, with_drift(self._noise, config) if metric else noise
+        )
         #: None: the IMU has not started.
         self.filter: core.InertialFilter | None = None
         #: Seconds of the last image whose pose is its own.
