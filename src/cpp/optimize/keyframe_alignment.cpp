@@ -191,6 +191,13 @@ double factor_of(std::vector<double>& squares, double quantile, double lost) {
   return std::sqrt(*at / quantile * lost);
 }
 
+/// The geometry of a young map is sure where depths were measured: then the first factor counts
+/// alone.
+void follow(NoiseFactor& noise, double factor, bool has_depths) {
+  if (has_depths && noise.n_measured() == 0 && factor > 0) noise.assume(std::min(factor, 1.0));
+  noise.measure(factor);
+}
+
 }  // namespace
 
 KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bool patches_only,
@@ -231,9 +238,11 @@ void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
   const BundleProblem& problem = bundle.problem;
   std::vector<double> squares, right_squares;
   double n_residuals = 0;
+  bool has_depths = false;
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
     const auto& o = problem.observations[i];
     n_residuals += o.has_depth ? 3 : 2;
+    has_depths |= o.has_depth;
     const ObservationKind kind = bundle.kinds[i];
     if (kind != ObservationKind::kAligned && kind != ObservationKind::kAlignedRight) continue;
     const auto& camera = problem.cameras[o.camera];
@@ -251,10 +260,9 @@ void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
   if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
   // The adjustment has taken so much of the noise into its unknowns.
   const double lost = n_residuals / (n_residuals - n_unknowns);
-  const double factor = factor_of(squares, kOfTwo, lost);
-  noise.position.measure(factor);
+  follow(noise.position, factor_of(squares, kOfTwo, lost), has_depths);
   if (right_squares.size() < kFewestResiduals) return;
-  noise.right.measure(factor_of(right_squares, kOfOne, lost));
+  follow(noise.right, factor_of(right_squares, kOfOne, lost), has_depths);
 }
 
 }  // namespace orbslam
