@@ -14,8 +14,8 @@
 namespace orbslam {
 namespace {
 
-/// The noise is read off where this share of the residuals lies: the gates, which depend on it, must
-/// keep the sightings whose errors are systematic.
+/// The noise is read off where this share of the residuals lies: the gates, which depend on it,
+/// must keep the sightings whose errors are systematic.
 constexpr double kShare = 0.9;
 /// Quantiles of the chi-square distribution at that share, by degrees of freedom.
 constexpr double kOfOne = 2.7055435, kOfTwo = 4.6051702;
