@@ -25,10 +25,10 @@ struct PointPatch {
 
 /// Where a keyframe sees a point by its patch, beside the keypoint, which stays where it is.
 struct AlignedSighting {
-  MapPointId point;    ///< the sighting of this point alone; invalid: nothing was tried
-  float u = 0, v = 0;  ///< undistorted pixels
-  float right_u = 0;   ///< column in the (virtual) right image
-  float variance = 0;  ///< of u and of v, as the patch says [pixels^2]; 0: failed
+  MapPointId point;          ///< the sighting of this point alone; invalid: nothing was tried
+  float u = 0, v = 0;        ///< undistorted pixels
+  float right_u = 0;         ///< column in the (virtual) right image
+  float variance = 0;        ///< of u and of v, as the patch says [pixels^2]; 0: failed
   float right_variance = 0;  ///< of the right column; 0: it has the noise of the keypoint
   bool reference = false;    ///< the patch was cut here
 

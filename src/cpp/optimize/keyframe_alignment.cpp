@@ -14,13 +14,15 @@
 namespace orbslam {
 namespace {
 
-/// The noise is read off where this share of the residuals lies: the gates, which depend on it, must
-/// keep the sightings whose errors are systematic.
+/// The noise is read off where this share of the residuals lies: the gates, which depend on it,
+/// must keep the sightings whose errors are systematic.
 constexpr double kShare = 0.9;
 /// Quantiles of the chi-square distribution at that share, by degrees of freedom.
 constexpr double kOfOne = 2.7055435, kOfTwo = 4.6051702;
 /// Sightings that a thread takes at a time.
 constexpr std::size_t kChunk = 64;
+/// Noise of a depth sensor before it is measured: its first geometry is sure.
+constexpr double kFirstWithDepths = 0.2;
 /// Fewest residuals that say something of the noise.
 constexpr std::size_t kFewestResiduals = 100;
 
@@ -209,6 +211,11 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bo
   }
   Task task = gather(map, current);
   if (task.sightings.empty()) return result;
+  const auto& depth = task.views.front().frame->depth;
+  const bool has_depths = std::any_of(depth.begin(), depth.end(), [](float z) { return z > 0; });
+  if (has_depths && !(noise > 0) && map.noise().position.n_measured() == 0) {
+    map.noise().position.assume(kFirstWithDepths);
+  }
   cut_missing_patches(task);
   for (const Point& point : task.points) result.n_patches += point.is_new ? 1 : 0;
   if (!patches_only) {
