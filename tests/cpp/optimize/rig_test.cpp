@@ -34,18 +34,18 @@ Pose random_pose(std::mt19937_64& random, double size) {
 
 double distance(const Pose& a, const Pose& b) { return (a * b.inverse()).log().norm(); }
 
-struct Seen {
+struct SeenPixel {
   float u, v, right_u;
   bool has_depth;
 };
 
-std::optional<Seen> look(const Camera& rig, const Pose& T_bw, const Eigen::Vector3d& point,
-                         bool has_depth) {
+std::optional<SeenPixel> look(const Camera& rig, const Pose& T_bw, const Eigen::Vector3d& point,
+                              bool has_depth) {
   Eigen::Vector2d uv;
   double disparity = 0;
   if (!rig.project(T_bw * point, uv, disparity)) return std::nullopt;
   const Eigen::Vector2f pixel = uv.cast<float>();
-  return Seen{pixel.x(), pixel.y(), pixel.x() - static_cast<float>(disparity), has_depth};
+  return SeenPixel{pixel.x(), pixel.y(), pixel.x() - static_cast<float>(disparity), has_depth};
 }
 
 TEST(Rig, PoseOfAFrameComesFromAllCameras) {

@@ -57,7 +57,8 @@ def with_drift(noise: FloatArray, config: InertialConfig) -> FloatArray:
         Thresholds.
     """
     drift = np.array([config.map_walk, 9.81 * config.map_walk, 0.0, 0.0])
-    return np.hypot(noise, drift)
+    noisier: FloatArray = np.hypot(noise, drift)
+    return noisier
 
 
 class InertialStarter:
