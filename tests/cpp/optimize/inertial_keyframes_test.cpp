@@ -15,7 +15,7 @@ using testing::AnalyticMotion;
 using testing::kNoise;
 using testing::kT_cb;
 
-constexpr double kStep = 0.2;
+constexpr double kSample = 0.2;
 
 KeyFrameId id(std::size_t k) { return KeyFrameId(static_cast<std::int64_t>(k)); }
 
@@ -26,7 +26,7 @@ struct Chain {
 
   explicit Chain(std::size_t n) {
     for (std::size_t k = 0; k < n; ++k) {
-      const double t = kStep * static_cast<double>(k);
+      const double t = kSample * static_cast<double>(k);
       auto frame = testing::make_raster_frame(static_cast<std::int64_t>(k), 60, -1, 0,
                                               testing::synthetic_camera(), 0);
       frame->timestamp = t;
@@ -41,7 +41,7 @@ struct Chain {
       map.update_point(point);
     }
     for (std::size_t k = 0; k < n; ++k) map.update_connections(id(k));
-    const double end = kStep * static_cast<double>(n - 1);
+    const double end = kSample * static_cast<double>(n - 1);
     inertial.add_samples(AnalyticMotion::samples(0, end, static_cast<int>(100 * end)));
   }
 
@@ -63,7 +63,7 @@ TEST(InertialCulling, LeavesNoGapOverHalfASecond) {
   Chain chain(12), without(12);
   const std::vector<KeyFrameId> dead = chain.cull(11);
   EXPECT_FALSE(dead.empty());
-  EXPECT_NEAR(chain.longest_gap(), 2 * kStep, 1e-9);
+  EXPECT_NEAR(chain.longest_gap(), 2 * kSample, 1e-9);
   cull_keyframes(without.map, id(11), false);
   EXPECT_GT(without.longest_gap(), 0.5);
 }
@@ -77,7 +77,7 @@ TEST(InertialCulling, MayLeaveThreeSecondsLongAgo) {
   double last = 0;
   chain.map.for_each_keyframe([&](const KeyFrame& keyframe) {
     const double t = keyframe.frame->timestamp;
-    if (last > 149 * kStep - 15) {
+    if (last > 149 * kSample - 15) {
       EXPECT_LE(t - last, 0.5);
     }
     last = t;
@@ -99,7 +99,7 @@ TEST(InertialCulling, NeighboursInTimeAreJoined) {
   ASSERT_EQ(after.size(), 2U);
   const Preintegration expected = before[1].motion->joined(*before[2].motion);
   const Preintegration& joined = *after[1].motion;
-  EXPECT_NEAR(joined.duration(), 2 * kStep, 1e-12);
+  EXPECT_NEAR(joined.duration(), 2 * kSample, 1e-12);
   EXPECT_LT(joined.motion().dR.angularDistance(expected.motion().dR), 1e-9);
   EXPECT_LT((joined.motion().dv - expected.motion().dv).norm(), 1e-9);
   EXPECT_LT((joined.motion().dp - expected.motion().dp).norm(), 1e-9);
@@ -119,7 +119,7 @@ TEST(InertialKeyframesVelocity, TurnsWithItsKeyframe) {
   chain.inertial.add_to(bundle, chain.inertial.newest(chain.map, 0, 10), chain.map);
   for (std::size_t k = 0; k < 3; ++k) {
     const Eigen::Vector3d expected =
-        turn * AnalyticMotion::velocity(kStep * static_cast<double>(k));
+        turn * AnalyticMotion::velocity(kSample * static_cast<double>(k));
     EXPECT_LT((bundle.problem.inertial.motions[k].velocity - expected).norm(), 1e-12);
   }
 }
