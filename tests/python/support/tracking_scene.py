@@ -330,7 +330,7 @@ class FakeInitializer:
     def lines(self) -> None:
         """None: one frame is enough."""
 
-    def try_initialize(self, frame: FakeFrame) -> Reason:
+    def try_initialize(self, frame: FakeFrame, T_cw: _core.Pose | None = None) -> Reason:
         if self.refusals:
             self.refusals -= 1
             return Reason.TOO_FEW_KEYPOINTS
