@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import time
-
 import cv2
 import numpy as np
 import pytest
@@ -144,16 +142,3 @@ def test_another_size() -> None:
     depth, colour, T = CASES["finer"]
     with pytest.raises(orb.ImageError, match=r"depth is 80 x 60, but the calibration .* 160 x 120"):
         DepthRegistration(depth, colour, T, 1000.0).register(np.ones((60, 80), np.uint16))
-
-
-def test_speed() -> None:
-    """640 x 480 pixels in less than 30 ms of one processor."""
-    depth, colour = lens(385, (640, 480)), lens(615, (640, 480))
-    registration = DepthRegistration(depth, colour, CASES["finer"][2], 1000.0)
-    raw = np.round(exact(depth, np.eye(4)) * 1000).astype(np.uint16)
-    spent = []
-    for _ in range(10):
-        begin = time.thread_time()
-        registration.register(raw)
-        spent.append(time.thread_time() - begin)
-    assert min(spent) < 0.03
