@@ -119,7 +119,7 @@ sanitize: | packages-package+cpp-tests
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
 	@ctest --test-dir build/asan --output-on-failure -j $(JOBS)
 	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
-	@build/tsan/tests/cpp/thread_driver --seconds 30
+	@build/tsan/tests/cpp/thread_driver --seconds 15
 
 # The whole system in threads, disturbed at random, under the thread sanitizer.
 STRESS_SECONDS ?= 600
