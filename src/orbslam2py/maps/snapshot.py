@@ -97,13 +97,15 @@ def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
 
 
 def keyframe_trajectory(slam_map: core.Map, map_index: int | None = None) -> Trajectory:
-    """Poses of the keyframes of a map (None: the active one), relative to the first one.
+    """Poses of the keyframes of a map (None: the active one), in the world of its trajectory.
 
+    They are relative to the first keyframe; an upright map keeps its own world.
     In the order of time; the order of ids may differ at the start of a single camera's map.
     """
     keyframes = core.snapshot_keyframes(slam_map, -1 if map_index is None else map_index)
     T_wc = keyframes.T_wc
-    if len(T_wc):
+    which = slam_map.active_map if map_index is None else map_index
+    if len(T_wc) and not slam_map.is_upright(which):
         T_wc = np.linalg.inv(T_wc[0]) @ T_wc
     order = np.argsort(keyframes.timestamps, kind="stable")
     return Trajectory(timestamps=keyframes.timestamps[order], T_wc=T_wc[order])

@@ -24,11 +24,12 @@ _POSES_FOR_SCALE = 3
 
 
 def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
-    """Map points (p, 3) in the frame of keyframe 0, like the trajectories."""
+    """Map points (p, 3) in the world of the trajectories."""
     snapshot = result.snapshot
     if not len(snapshot.keyframe_T_wc):
         return snapshot.point_positions
-    T_0w = np.linalg.inv(snapshot.keyframe_T_wc[0])
+    first = int(np.argsort(snapshot.keyframe_timestamps, kind="stable")[0])
+    T_0w = result.keyframes.T_wc[0] @ np.linalg.inv(snapshot.keyframe_T_wc[first])
     points: npt.NDArray[np.float64] = snapshot.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3]
     return points
 
