@@ -104,8 +104,8 @@ def keyframe_trajectory(slam_map: core.Map, map_index: int | None = None) -> Tra
     """
     keyframes = core.snapshot_keyframes(slam_map, -1 if map_index is None else map_index)
     T_wc = keyframes.T_wc
-    which = slam_map.active_map if map_index is None else map_index
-    if len(T_wc) and not slam_map.is_upright(which):
-        T_wc = np.linalg.inv(T_wc[0]) @ T_wc
+    if len(T_wc):
+        which = slam_map.active_map if map_index is None else map_index
+        T_wc = T_wc if slam_map.is_upright(which) else np.linalg.inv(T_wc[0]) @ T_wc
     order = np.argsort(keyframes.timestamps, kind="stable")
     return Trajectory(timestamps=keyframes.timestamps[order], T_wc=T_wc[order])
