@@ -84,7 +84,7 @@ def test_keyframes_are_told_in_the_order_of_time(monkeypatch: pytest.MonkeyPatch
     T_wc[:, 0, 3] = [1, 3, 2]
     keyframes = SimpleNamespace(timestamps=np.array([0.5, 1.5, 1.0]), T_wc=T_wc)
     monkeypatch.setattr(snapshots.core, "snapshot_keyframes", lambda *_: keyframes)
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(active_map=0, is_upright=lambda _: False)
     path = snapshots.keyframe_trajectory(nothing)
     np.testing.assert_array_equal(path.timestamps, [0.5, 1.0, 1.5])
     np.testing.assert_array_equal(path.T_wc[:, 0, 3], [0, 1, 2])
