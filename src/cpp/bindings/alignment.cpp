@@ -9,6 +9,7 @@
 #include "bindings/stop_flag.hpp"
 #include "optimize/frame_alignment.hpp"
 #include "optimize/keyframe_alignment.hpp"
+#include "optimize/point_following.hpp"
 #include "optimize/sighting_alignment.hpp"
 
 namespace orbslam::bindings {
@@ -149,6 +150,35 @@ void bind_sightings(py::module_& module) {
                              "Median distance between sightings and points, pixels.");
 }
 
+void bind_followed_points(py::module_& module) {
+  py::class_<FollowedPoints>(module, "FollowedPoints",
+                             "Points of an earlier frame, found in another image by their patches.")
+      .def("__len__", [](const FollowedPoints& self) { return self.points.size(); })
+      .def_readonly("extraction", &FollowedPoints::extraction,
+                    "One keypoint a point, with its descriptor, and the pyramid of the image.")
+      .def_readonly("T_cw", &FollowedPoints::T_cw, "Pose; None: too few points were found.")
+      .def_readonly("n_patches", &FollowedPoints::n_patches,
+                    "Inliers of the earlier frame that have a patch.")
+      .def_readonly("n_in_view", &FollowedPoints::n_in_view,
+                    "Of these, points that the pose puts into the image.");
+  module.def(
+      "follow_points",
+      [](const Map& map, const FrameContext& context, const TrackedFrame& earlier, const Pose& T_cw,
+         const py::array& grey) {
+        // The pyramid shares the pixels.
+        const cv::Mat image = view_uint8(grey, "the image").clone();
+        const py::gil_scoped_release release;
+        return follow_points(map, context, earlier, T_cw, image);
+      },
+      "map"_a, "context"_a, "earlier"_a, "T_cw"_a, "grey"_a,
+      "Look for the inliers of an earlier frame in a grey image (h, w) uint8 by their patches,\n"
+      "around the predicted pose. Raises ImageError for anything but a grey image.");
+  module.def(
+      "associate_followed", &associate, "map"_a, "frame"_a, "followed"_a, "noise"_a = 0.0,
+      "Associate a frame that was built of the features of these points with them, and give\n"
+      "it their pose. Raises StateError for another frame, and where there is no pose.");
+}
+
 void bind_map_alignment(py::module_& module) {
   module.def(
       "align_keyframes",
@@ -168,6 +198,7 @@ void bind_map_alignment(py::module_& module) {
   module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, "noise"_a = 0.0, Release(),
              "Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the\n"
              "sightings tried by AlignmentFailure.");
+  bind_followed_points(module);
   module.def(
       "alignment_noise",
       [](const Map& map) {

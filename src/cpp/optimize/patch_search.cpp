@@ -2,6 +2,7 @@
 #include "optimize/patch_search.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 
 #include "features/level_placement.hpp"
 
@@ -21,11 +22,12 @@ Eigen::Vector2d to_level(const LevelPlacement& place, const Eigen::Vector2f& pix
 
 FoundPatch find_patch(const PlacedPatch& placed, const Frame& frame, const Pose& T_cw,
                       const ImagePyramid& images, const Eigen::Vector2f& start,
-                      const AlignmentOptions& options) {
+                      const AlignmentOptions& options, int coarser) {
   FoundPatch result;
   const auto warp = warp_of(placed.surface, *frame.camera, T_cw);
   if (!warp) return result;
-  const int level = warped_level(*frame.scales, placed.level, warp->A);
+  const int level = std::min(warped_level(*frame.scales, placed.level, warp->A) + coarser,
+                             static_cast<int>(images.levels.size()) - 1);
   const LevelPlacement there(*frame.scales, level, frame.camera->image_size());
   const LevelPlacement here(*placed.scales, placed.level, placed.camera->image_size());
   const Eigen::Vector2d scale = scale_of(there);
@@ -39,6 +41,8 @@ FoundPatch find_patch(const PlacedPatch& placed, const Frame& frame, const Pose&
   const Eigen::Vector2f raw(there.x.to_image(static_cast<float>(aligned.position.x())),
                             there.y.to_image(static_cast<float>(aligned.position.y())));
   const Eigen::Vector2f pixel = frame.camera->from_image(raw);
+  result.raw = raw;
+  result.level = level;
   result.u = pixel.x();
   result.v = pixel.y();
   result.level_scale = static_cast<float>(scale.x());

@@ -22,18 +22,21 @@ struct PlacedPatch {
 
 struct FoundPatch {
   AlignmentFailure failure = AlignmentFailure::kOutside;
-  float u = 0, v = 0;     ///< undistorted pixels
-  float variance = 0;     ///< of u and of v, mean of both [pixels^2]
-  float level_scale = 1;  ///< pixels per pixel of the level
+  float u = 0, v = 0;                             ///< undistorted pixels
+  float variance = 0;                             ///< of u and of v, mean of both [pixels^2]
+  float level_scale = 1;                          ///< pixels per pixel of the level
+  int level = 0;                                  ///< of the image in which it was aligned
+  Eigen::Vector2f raw = Eigen::Vector2f::Zero();  ///< pixel of the image
 
   bool ok() const { return failure == AlignmentFailure::kNone; }
 };
 
 /// Warps a patch into an image of `frame`, seen from `T_cw`, and aligns it from the raw pixel
-/// `start` on. Nothing is allocated. See docs/method/alignment.md#warp.
+/// `start` on, `coarser` levels above the one that shows it as large as the reference. Nothing is
+/// allocated. See docs/method/alignment.md#warp.
 FoundPatch find_patch(const PlacedPatch& placed, const Frame& frame, const Pose& T_cw,
                       const ImagePyramid& images, const Eigen::Vector2f& start,
-                      const AlignmentOptions& options = {});
+                      const AlignmentOptions& options = {}, int coarser = 0);
 
 /// Raw pixel of a keypoint.
 inline Eigen::Vector2f raw_pixel(const Frame& frame, std::size_t i) {

@@ -189,8 +189,9 @@ NewMapAfterOption = Annotated[
 EffortOption = Annotated[
     Effort,
     typer.Option(
-        help="How much work goes into map and path: fast makes fewer keyframes, thorough matches "
-        "every frame with the map once more when the map has settled."
+        help="How much work goes into map and path: fast makes fewer keyframes, light finds "
+        "features only where patches of known points are not enough (one camera, RGB-D), thorough "
+        "matches every frame with the map once more when the map has settled."
     ),
 ]
 SetOption = Annotated[

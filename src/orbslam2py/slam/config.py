@@ -335,6 +335,9 @@ class AlignmentConfig:
     noise: float = 0.0
     """Standard deviation of an aligned sighting over that of a corner; 0: as patches and
     residuals say."""
+    follow: bool = False
+    """Where this sensor is aligned, track frames between two keyframes by patches alone and find
+    features only where patches are not enough. One camera or RGB-D, without an IMU."""
 
     def for_sensor(self, sensor: Sensor) -> AlignmentConfig:
         """Return the values in use with a sensor."""
@@ -345,8 +348,13 @@ class AlignmentConfig:
             Sensor.RIG: False,
         }
         if not on[sensor]:
-            return replace(self, right_image=False, new_keyframes=False, tracked_inliers=0)
-        return replace(self, right_image=self.right_image and sensor is Sensor.STEREO)
+            return replace(
+                self, right_image=False, new_keyframes=False, tracked_inliers=0, follow=False
+            )
+        stereo = sensor is Sensor.STEREO
+        return replace(
+            self, right_image=self.right_image and stereo, follow=self.follow and not stereo
+        )
 
     @property
     def uses_points(self) -> bool:
@@ -426,6 +434,8 @@ PRESETS: Mapping[str, Mapping[str, float | int | bool]] = {
         "keyframes.share": 0.6,
         "keyframes.share_monocular": 0.8,
     },
+    # Features only where patches are not enough.
+    "light": {"alignment.follow": True, "alignment.monocular": True, "alignment.rgbd": True},
     "normal": {},
     "thorough": {"trajectory.rematch_every_frame": True},
 }

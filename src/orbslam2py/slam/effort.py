@@ -10,6 +10,7 @@ class Effort(str, Enum):
     """Presets of the configuration: see `orbslam2py.slam.config.PRESETS`."""
 
     FAST = "fast"
+    LIGHT = "light"
     NORMAL = "normal"
     THOROUGH = "thorough"
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,9 @@ Mask = npt.NDArray[np.uint8]
 #: For a pair: one mask for both images, or (left, right), either of which may be None.
 PairMask = Mask | tuple[Mask | None, Mask | None]
 
+
+#: Looks for known points in a grey image; None where too few are found.
+Follow = Callable[[core.FrameContext, npt.NDArray[np.uint8]], core.FollowedPoints | None]
 
 _LARGEST_NUMBER = 8  # bytes of the largest type of depth that is converted
 
@@ -110,6 +114,47 @@ class FrontEnd:
             extraction = extractor.extract(grey, mask)
             frame = core.build_monocular_frame(context, frame_id, timestamp, extraction)
             return self._finished(frame, image, grey, extraction)
+
+    def without_features(
+        self,
+        image: npt.NDArray[np.uint8],
+        depth: npt.NDArray[np.generic] | None,
+        frame_id: int,
+        timestamp: float,
+        follow: Follow,
+    ) -> tuple[core.FollowedPoints, core.Frame] | None:
+        """Follow known points in an image of one camera, without features.
+
+        Parameters
+        ----------
+        image, depth
+            As for `monocular` and `rgbd`; no depth with a single camera.
+        frame_id, timestamp
+            Of the frame.
+        follow
+            Looks for the points in the grey image.
+
+        Returns
+        -------
+        tuple or None
+            The points, and the frame of their keypoints; None where too few were found.
+        """
+        self._check(image, "image")
+        if depth is not None:
+            depth = self._depth_of(depth, image)
+        context = self._context_for(image)
+        grey = core.to_grey(image, self._settings.camera.rgb)
+        followed = follow(context, grey)
+        if followed is None:
+            return None
+        extraction = followed.extraction
+        if depth is None:
+            frame = core.build_monocular_frame(context, frame_id, timestamp, extraction)
+        else:
+            frame = core.build_rgbd_frame(
+                context, frame_id, timestamp, extraction, depth, self._settings.depth_factor
+            )
+        return followed, self._finished(frame, image, grey, extraction)
 
     def _extractor_for(self, factor: int) -> core.OrbExtractor:
         if factor not in self._extractors:

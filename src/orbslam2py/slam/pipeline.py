@@ -18,6 +18,7 @@ from orbslam2py import _core as core
 from orbslam2py._arguments import is_finite, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
+from orbslam2py._values import replace
 from orbslam2py.errors import ImageError
 from orbslam2py.maps.map_autosave import MapAutosave, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
@@ -28,8 +29,10 @@ from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
+from orbslam2py.slam.followed_frames import FollowedFrames
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
+from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput, InertialTracker
 from orbslam2py.slam.inertial_config import InertialConfig
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
@@ -49,7 +52,12 @@ from orbslam2py.slam.records import (
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.rig_front_end import RigFrontEnd, front_end_of
 from orbslam2py.slam.tracking import Tracking
-from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
+from orbslam2py.slam.watched_frame import (
+    FrameWatcher,
+    WatchedFrame,
+    accepted_keypoints,
+    frame_features,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -58,9 +66,6 @@ _NO_SECONDS = 1e11
 
 #: Keyframes after which the first frames of a map are estimated again, and frames at the latest.
 _SETTLED_MAP, _YOUNG_FRAMES = 10, 250
-
-#: Makes a frame of images: takes its id and a timer.
-BuildFrame = Callable[[int, StageTimer], core.Frame]
 
 
 class Pipeline:
@@ -109,11 +114,17 @@ class Pipeline:
             keep_images=alignment.uses_points,
             align_right=alignment.right_image,
         )
+        self._followed: FollowedFrames | None = None
         self._kept_images = KeptImages(every_frame=config.trajectory.rematch_every_frame)
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         #: Uses the IMU in tracking; None without settings of one.
         self.inertial_tracker = _make_inertial(setup, back_end, config.inertial)
         self.tracking = _make_tracking(setup, back_end, options, config, self.inertial_tracker)
+        if alignment.follow and self.inertial_tracker is None:
+            assert isinstance(self.front_end, FrontEnd)
+            # A single camera's young map still changes its shape.
+            fewest = 0 if sensor.has_depth else config.tracking.small_map + 1
+            self._followed = FollowedFrames(back_end.map, self.front_end, alignment.noise, fewest)
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(
             setup.imu, back_end.events.worker.offer if in_time else _at_once
@@ -183,7 +194,7 @@ class Pipeline:
         return front_end.monocular(image, frame_id, timestamp, timer, mask, feature_factor=factor)
 
     def process(
-        self, timestamp: float, build: BuildFrame, image: ByteArray, *, details: bool
+        self, timestamp: float, image: ByteArray, second: Any, mask: Any, *, details: bool
     ) -> TrackingRecord:
         """Take one image from its pixels to its record.
 
@@ -191,41 +202,56 @@ class Pipeline:
         ----------
         timestamp : float
             Seconds.
-        build : callable
-            Makes the frame: ``build(frame_id, timer)``.
         image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-            The data of the frame that viewers get.
+            The image, the left one of a pair; viewers get it.
+        second : array, or None
+            The right image, the depth, or the images of a rig.
+        mask : array of uint8, or None
+            Where no keypoint may lie.
         details : bool
             The record contains keypoints and matches.
         """
         self._make_ready(timestamp)
         tracking = self.tracking
         timer = StageTimer()
-        with timer("track"):
-            # Features are found while mapping works: they do not depend on the map.
-            frame = core.TrackedFrame(build(self._next_frame_id, timer))
-        if self.localization.on:
-            # Aligned points would pull frames towards the map while odometry still holds them.
-            core.release_images(frame.features)
-        if self._waits_for_mapping:
-            with timer("wait"):
-                self._wait_for_mapping(frame)
-        self._look_again_at_start()
         state_before = tracking.state
         watchers = self.frame_watchers
-        with timer("track"):
-            # From here on the image counts: every id is one image.
-            self._next_frame_id += 1
-            self._last_timestamp = timestamp
-            # The samples of the IMU from the image before to this one; None without an IMU.
-            interval = self._take_samples(timestamp)
-            outcome = tracking.track(
-                frame,
-                timer,
-                localize=self.localization.on,
-                details=details or bool(watchers),
-                interval=interval,
-            )
+        details_wanted = details or bool(watchers)
+        followed = self._follow(timestamp, image, second, mask, timer)
+        if followed is not None:
+            frame, outcome = followed
+            if details_wanted:
+                outcome = replace(outcome, inliers=accepted_keypoints(frame))
+            interval = None
+        else:
+            with timer("track"):
+                # Features are found while mapping works: they do not depend on the map.
+                frame = core.TrackedFrame(
+                    self.build_frame(image, second, self._next_frame_id, timestamp, timer, mask)
+                )
+            if self.localization.on:
+                # Aligned points would pull frames towards the map while odometry still holds them.
+                core.release_images(frame.features)
+            if self._waits_for_mapping:
+                with timer("wait"):
+                    self._wait_for_mapping(frame)
+            self._look_again_at_start()
+            with timer("track"):
+                # From here on the image counts: every id is one image.
+                self._next_frame_id += 1
+                self._last_timestamp = timestamp
+                # The samples of the IMU from the image before to this one; None without an IMU.
+                interval = self._take_samples(timestamp)
+                outcome = tracking.track(
+                    frame,
+                    timer,
+                    localize=self.localization.on,
+                    details=details_wanted,
+                    interval=interval,
+                )
+            if self._followed is not None:
+                ok = outcome.state is TrackingState.OK and not outcome.estimate.unconfirmed
+                self._followed.note(frame if ok and frame.T_cw is not None else None)
         self.statistics.add(timer.milliseconds)
         self._kept_images.note(
             frame.features,
@@ -245,6 +271,24 @@ class Pipeline:
         if self._keeps_images and record.is_keyframe:
             self.keeper.keep_image(record.reference_keyframe, encode_image(image))
         return record
+
+    def _follow(
+        self, timestamp: float, image: ByteArray, second: Any, mask: Any, timer: StageTimer
+    ) -> tuple[core.TrackedFrame, TrackingResult] | None:
+        """Track an image by the patches of known points; None where it needs features."""
+        if self._followed is None or mask is not None or self.localization.on:
+            return None
+        if self._waits_for_mapping:
+            with timer("wait"):
+                self.back_end.mapping.worker.wait_until_idle(unless_held=True)
+        state = self.tracking.tracking_state
+        with timer("track"):
+            found = self._followed.follow(image, second, self._next_frame_id, timestamp, state)
+            if found is None:
+                return None
+            self._next_frame_id += 1
+            self._last_timestamp = timestamp
+            return found[0], self.tracking.take_followed(*found)
 
     def _make_ready(self, timestamp: float) -> None:
         for worker in self.back_end.workers:

@@ -77,6 +77,7 @@ class PoseMethod(str, enum.Enum):
     WIDE_WINDOW = "wide window"
     ALL_KEYPOINTS = "all keypoints"
     NEAR_PREDICTION = "near prediction"
+    PATCHES = "patches"
     #: Predicted by the IMU; no image supports it.
     IMU = "imu"
 

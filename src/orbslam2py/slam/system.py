@@ -24,7 +24,6 @@ from orbslam2py._arguments import (
     shown,
 )
 from orbslam2py._call_guard import CallGuard
-from orbslam2py._timing import StageTimer
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.inertial.samples import ImuSamples
 from orbslam2py.maps.contents import MapContents
@@ -105,9 +104,11 @@ class System:
         searched. Otherwise mapping stops until the camera sees the old map again.
     new_map_after : float
         Time between the loss and the start of another map, in seconds of the time stamps.
-    effort : {"fast", "normal", "thorough"}
-        Amount of work for map and trajectory: ``fast`` makes fewer keyframes; ``thorough`` matches
-        every frame with the map again after the map has settled, the last thousand in `shutdown`.
+    effort : {"fast", "light", "normal", "thorough"}
+        Amount of work for map and trajectory: ``fast`` makes fewer keyframes; ``light`` tracks one
+        camera or RGB-D without features where patches of known points are enough; ``thorough``
+        matches every frame with the map again after the map has settled, the last thousand in
+        `shutdown`.
     config : Config or mapping, optional
         Changes of thresholds, by names with a dot: ``{"tracking.map_matches": 12}``; see
         `orbslam2py.slam.config`.
@@ -258,13 +259,10 @@ class System:
             cameras: Any = second
             first = self.pipeline.front_end.mosaic(cameras)
 
-        def build(frame_id: int, timer: StageTimer) -> core.Frame:
-            return self.pipeline.build_frame(first, second, frame_id, timestamp, timer, chosen)
-
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            return self.pipeline.process(timestamp, build, first, details=details)
+            return self.pipeline.process(timestamp, first, second, chosen, details=details)
 
     def add_imu(self, samples: ImuSamples | npt.ArrayLike) -> None:
         """Add samples of an IMU as they come; they wait for the images that they belong to.

@@ -272,6 +272,29 @@ class Tracking:
         frame.discard_outliers()
         return TrackingResult(self._state.phase, estimate, is_keyframe, inliers=inliers)
 
+    def take_followed(
+        self, frame: core.TrackedFrame, estimate: PoseEstimate, state: State
+    ) -> TrackingResult:
+        """Take a frame whose pose the patches of known points gave; it becomes no keyframe.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame with its pose.
+        estimate : PoseEstimate
+            How it was found.
+        state : State
+            The state before the frame, which follows the map.
+        """
+        self._state = state
+        self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
+        return TrackingResult(self._state.phase, estimate)
+
+    @property
+    def tracking_state(self) -> State:
+        """All that is carried from one image to the next."""
+        return self._state
+
     def _follow_imu(
         self,
         inertial: InertialTracker,

@@ -32,7 +32,7 @@ Pose random_pose(std::mt19937_64& random, double size) {
   return Pose::exp(xi);
 }
 
-double distance(const Pose& a, const Pose& b) { return (a * b.inverse()).log().norm(); }
+double pose_difference(const Pose& a, const Pose& b) { return (a * b.inverse()).log().norm(); }
 
 struct SeenPixel {
   float u, v, right_u;
@@ -71,7 +71,7 @@ TEST(Rig, PoseOfAFrameComesFromAllCameras) {
   for (const std::size_t n : cameras) EXPECT_GT(n, 20U);
   const PoseEstimate estimate =
       optimize_pose(random_pose(random, 0.03) * truth, *rig, observations);
-  EXPECT_LT(distance(estimate.T_cw, truth), 1e-4);
+  EXPECT_LT(pose_difference(estimate.T_cw, truth), 1e-4);
   for (std::size_t i = 0; i < observations.size(); ++i) {
     EXPECT_EQ(estimate.outlier[i] != 0, i % 10 == 3) << i;
   }
@@ -116,7 +116,7 @@ TEST(Rig, BothSolversFindPosesAndPoints) {
     EXPECT_GT(summary.initial_cost, 1e3);
     EXPECT_LT(summary.final_cost, 1);
     for (std::size_t i = 0; i < truth.size(); ++i) {
-      EXPECT_LT(distance(problem.cameras[i].T_cw, truth[i]), 1e-3) << i;
+      EXPECT_LT(pose_difference(problem.cameras[i].T_cw, truth[i]), 1e-3) << i;
     }
   }
 }

@@ -12,7 +12,8 @@ from orbslam2py import Sensor, System
 from orbslam2py import _core as core
 from orbslam2py.slam.config import AlignmentConfig
 from orbslam2py.slam.kept_images import KeptImages
-from support.small_sequences import ate, new_system, play
+from orbslam2py.slam.records import PoseMethod, TrackingState
+from support.small_sequences import ate, black, images, new_system, play, track
 
 OFF = {"alignment.stereo": False, "alignment.rgbd": False}
 ON = {"alignment.stereo": True, "alignment.rgbd": True}
@@ -93,3 +94,60 @@ def test_only_the_newest_keyframes_keep_their_images(monkeypatch: pytest.MonkeyP
 def test_frames_keep_no_images_without_alignment() -> None:
     with played(Sensor.RGBD, OFF, 3) as system:
         assert not system.pipeline.tracking.motion.last.features.has_images
+
+
+# ---- frames without features ---------------------------------------------------------------------
+FOLLOW = {"alignment.rgbd": True, "alignment.monocular": True, "alignment.follow": True}
+
+
+@pytest.mark.parametrize("kind", [Sensor.RGBD, Sensor.MONOCULAR])
+def test_frames_are_followed_without_features(kind: Sensor) -> None:
+    errors = []
+    for changes in (FOLLOW, OFF):
+        with new_system(kind, deterministic=True, config=changes) as system:
+            records = play(system, 60)
+            assert all(record.T_cw is not None for record in records[20:])
+        errors.append(ate(system))
+        if changes is FOLLOW:
+            followed = [record for record in records if record.method is PoseMethod.PATCHES]
+            assert len(followed) > 20
+            assert not any(record.is_keyframe for record in followed)
+            assert "extract" not in followed[0].milliseconds
+            assert all(record.covariance is not None for record in followed)
+    assert errors[0] < errors[1]
+
+
+def test_a_followed_frame_has_the_keypoints_of_its_points() -> None:
+    with new_system(Sensor.RGBD, deterministic=True, config=FOLLOW) as system:
+        play(system, 6)
+        record = track(system, 6, details=True)
+        assert record.method is PoseMethod.PATCHES
+        assert record.features is not None
+        assert np.count_nonzero(record.features.inliers) == record.n_inliers
+
+
+def test_frames_need_features_where_the_image_shows_something_else() -> None:
+    with new_system(Sensor.RGBD, deterministic=True, config=FOLLOW) as system:
+        play(system, 6)
+        system.track(black(Sensor.RGBD), 100.0)
+        assert system.state is TrackingState.LOST
+        record = system.track(images(Sensor.RGBD, 6), 101.0)
+        assert record.T_cw is not None
+        assert record.method is PoseMethod.RELOCALIZATION
+
+
+def test_a_mask_needs_features() -> None:
+    with new_system(Sensor.RGBD, deterministic=True, config=FOLLOW) as system:
+        play(system, 6)
+        shown = images(Sensor.RGBD, 6)
+        mask = np.full(shown.image.shape[:2], 255, np.uint8)
+        assert system.track(shown, 100.0, mask=mask).method is not PoseMethod.PATCHES
+
+
+def test_pairs_are_not_followed() -> None:
+    assert not AlignmentConfig(stereo=True, follow=True).for_sensor(Sensor.STEREO).follow
+
+
+def test_repeated_runs_without_features_are_equal() -> None:
+    with played(Sensor.RGBD, FOLLOW) as first, played(Sensor.RGBD, FOLLOW) as second:
+        np.testing.assert_array_equal(first.trajectory().T_wc, second.trajectory().T_wc)
