@@ -8,9 +8,8 @@
 namespace orbslam {
 
 /// Standard deviation of aligned sightings over that of corners of the same pyramid level. It
-/// begins at 1: a young map has to prove that its sightings agree better than corners. It follows
-/// what is measured slowly, as an exponential mean of the logarithm. Reading needs no lock; one
-/// thread writes.
+/// begins at 1, where it stays for a single camera, and follows what is measured slowly, as an
+/// exponential mean of the logarithm. Reading needs no lock; one thread writes.
 class NoiseFactor {
  public:
   double value() const { return value_.load(std::memory_order_relaxed); }

@@ -193,10 +193,9 @@ double factor_of(std::vector<double>& squares, double quantile, double lost) {
   return std::sqrt(*at / quantile * lost);
 }
 
-/// The geometry of a young map is sure where depths were measured: then the first factor counts
-/// alone.
-void follow(NoiseFactor& noise, double factor, bool has_depths) {
-  if (has_depths && noise.n_measured() == 0 && factor > 0) noise.assume(std::min(factor, 1.0));
+/// The first factor counts alone: depths make the geometry of a young map sure.
+void follow(NoiseFactor& noise, double factor) {
+  if (noise.n_measured() == 0 && factor > 0) noise.assume(std::min(factor, 1.0));
   noise.measure(factor);
 }
 
@@ -262,14 +261,17 @@ void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
     const double right = camera.model->right_error(p, error, o.u, o.v, o.right_u);
     right_squares.push_back(corner * right * right);
   }
+  // Images alone bend to the errors of the calibration, so that residuals do not show these: the
+  // sightings of a single camera keep the noise of a corner.
+  if (!has_depths) return;
   const double n_free = static_cast<double>(problem.cameras.size()) - bundle.n_fixed();
   const double n_unknowns = 3 * static_cast<double>(problem.points.size()) + 6 * n_free;
   if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
   // The adjustment has taken so much of the noise into its unknowns.
   const double lost = n_residuals / (n_residuals - n_unknowns);
-  follow(noise.position, factor_of(squares, kOfTwo, lost), has_depths);
+  follow(noise.position, factor_of(squares, kOfTwo, lost));
   if (right_squares.size() < kFewestResiduals) return;
-  follow(noise.right, factor_of(right_squares, kOfOne, lost), has_depths);
+  follow(noise.right, factor_of(right_squares, kOfOne, lost));
 }
 
 }  // namespace orbslam

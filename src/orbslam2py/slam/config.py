@@ -329,7 +329,7 @@ class AlignmentConfig:
     """Where stereo pairs are aligned, align the right image to the left one as well."""
     new_keyframes: bool = True
     """Align the sightings of new keyframes and new points before local bundle adjustment."""
-    tracked_inliers: int = 200
+    tracked_inliers: int = 100
     """Most inliers of a tracked frame that are aligned before its last pose optimization;
     0: none."""
     noise: float = 0.0

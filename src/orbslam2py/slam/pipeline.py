@@ -123,7 +123,7 @@ class Pipeline:
         if alignment.follow and self.inertial_tracker is None:
             assert isinstance(self.front_end, FrontEnd)
             # A single camera's young map still changes its shape.
-            fewest = 0 if sensor.has_depth else config.tracking.small_map + 1
+            fewest = 0 if sensor.has_depth else _SETTLED_MAP
             self._followed = FollowedFrames(back_end.map, self.front_end, alignment.noise, fewest)
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(

@@ -53,14 +53,14 @@ TEST(FollowPoints, FindsThePoseOfAnImageWithoutFeatures) {
   ASSERT_TRUE(points.T_cw.has_value());
   EXPECT_GT(points.n_in_view, 9 * points.n_patches / 10);
   EXPECT_GT(points.points.size(), 8 * points.n_in_view / 10);
-  // The points of the wall are wrong by up to 2 cm.
-  EXPECT_LT((points.T_cw->center() - truth.center()).norm(), 0.01);
+  // The points of the wall are wrong by up to 2 cm, and the places of their patches by 0.7 pixels.
+  EXPECT_LT((points.T_cw->center() - truth.center()).norm(), 0.03);
 
   TrackedFrame frame = w.frame_of(points);
-  associate(w.wall.map, frame, points);
+  associate(w.wall.map, frame, points, 1);
   EXPECT_EQ(frame.n_associated(), points.points.size());
   EXPECT_GT(optimize_pose(frame).n_inliers, static_cast<int>(8 * points.points.size() / 10));
-  EXPECT_LT((frame.T_cw->center() - truth.center()).norm(), 0.01);
+  EXPECT_LT((frame.T_cw->center() - truth.center()).norm(), 0.03);
   for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
     ASSERT_NE(frame.aligned_at(i), nullptr);
     EXPECT_EQ(frame.aligned_at(i)->u, frame.frame->keypoints[i].x);
