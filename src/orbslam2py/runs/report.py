@@ -133,6 +133,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         **losses,
         "initialisation_reasons": initialization_reasons(result),
         "depth": depth_entry(result),
+        "alignment": result.alignment,
         "imu": result.imu,
         "warnings": result.warnings,
         "interrupted": result.interrupted,

@@ -109,6 +109,8 @@ class RunResult:
     """The last full bundle adjustment of the finished map, if it was requested."""
     median_depth: float | None = None
     """Of the first depth images [m]; None without depth."""
+    alignment: dict[str, Any] | None = None
+    """Noise of aligned sightings, as in ``report.json``; None where nothing is aligned."""
     imu: dict[str, Any] | None = None
     """What is known of the IMU, as in ``report.json``; None without one."""
     imu_settings: ImuSettings | None = None

@@ -33,7 +33,7 @@ from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.depth_check import doubt_of_tum_factor
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.slam.records import PoseMethod, TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory.trajectory import Trajectory
 
@@ -182,12 +182,27 @@ class SequenceRunner:
         result.calibration_warnings = self._calibration_warnings(system)
         result.warnings += result.calibration_warnings
         self._collect(system)
+        result.alignment = self._alignment_entry(system)
         if system.imu_check is not None:
             n_samples = system.pipeline.inertial.n_samples
             metric = system.pipeline.back_end.map.is_upright(result.main_map)
             result.imu = imu_entry(system.imu_check, n_samples, metric=metric)
         result.seconds = time.perf_counter() - begin
         return result
+
+    def _alignment_entry(self, system: System) -> dict[str, Any] | None:
+        """Return the noise of aligned sightings; None where nothing is aligned."""
+        pipeline = system.pipeline
+        if not pipeline.alignment.uses_points:
+            return None
+        noise, right_noise = core.alignment_noise(pipeline.back_end.map)
+        records = [row.record for row in self.result.rows if row.record is not None]
+        followed = sum(record.method is PoseMethod.PATCHES for record in records)
+        return {
+            "noise_px": noise,
+            "right_noise_px": right_noise,
+            "frames_without_features": followed,
+        }
 
     def _judge_depth(self, system: System) -> None:
         """Store the depth, and warn of a factor that is only the default of another data set."""

@@ -104,7 +104,8 @@ class Pipeline:
         sensor = setup.sensor
         self._sensor = sensor
         config = options.full_config.for_features(setup.settings.orb.n_features)
-        alignment = config.alignment.for_sensor(sensor)
+        #: Which positions are measured by patches.
+        self.alignment = alignment = config.alignment.for_sensor(sensor)
         self._vocabulary = setup.vocabulary
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images

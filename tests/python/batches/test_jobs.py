@@ -84,7 +84,10 @@ def test_file(places: Path) -> None:
             r"settings are a Settings object.*; save it .* and give the path",
         ),
         ({"sequences": ["a/01"], "options": {"deterministic": "no"}}, "deterministic is 'no'"),
-        ({"sequences": ["a/01"], "options": {"effort": "slow"}}, "effort is 'slow'.* fast, light, normal"),
+        (
+            {"sequences": ["a/01"], "options": {"effort": "slow"}},
+            "effort is 'slow'.* fast, light, normal",
+        ),
         ({"sequences": ["a/01"], "sweep": {"ThDepth": ["x"]}}, "^sweep: a value of ThDepth is 'x'"),
     ],
 )

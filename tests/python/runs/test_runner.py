@@ -116,3 +116,18 @@ def test_run_that_switches(sensor: Sensor, deterministic: bool) -> None:
     assert len(set(hashes[25:])) == 1
     assert len(set(hashes[:25])) > 1
     assert max(result.keyframes.timestamps) < sequence.timestamps[25]
+
+
+def test_report_says_how_well_patches_agree() -> None:
+    sequence = SyntheticSequence(SyntheticOptions(sensor="rgbd", world="corridor", frames=30))
+    options = SystemOptions(deterministic=True, effort="light")
+    result = SequenceRunner(
+        sequence, sequence.settings, None, RunOptions(Sensor.RGBD, system=options)
+    ).run()
+    found = make_report(result, None)["alignment"]
+    assert found is not None
+    assert 0 < found["noise_px"] < 0.5
+    assert found["frames_without_features"] > 15
+    pair = recorded(Sensor.STEREO)
+    plain = SequenceRunner(pair, pair.settings, None, RunOptions(Sensor.STEREO)).run()
+    assert make_report(plain, None)["alignment"] is None
