@@ -13,6 +13,8 @@ import pytest
 
 from orbslam2py._files import atomic_write
 from orbslam2py.runs import outputs
+from orbslam2py.runs.report_page.markup import Markup
+from orbslam2py.runs.report_page.page import PageKind, whole_page
 from support.data import shared_folder
 from support.rendered_once import render_once
 from support.watchdog import watchdog, worker_threads
@@ -82,7 +84,7 @@ def _no_picture_of_a_run(request: pytest.FixtureRequest, monkeypatch: pytest.Mon
 
 def _write_empty_page(path: Path, *_: object) -> None:
     with atomic_write(path) as stream:
-        stream.write("<!DOCTYPE html>\n")
+        stream.write(whole_page("", "", [], Markup(""), Markup(""), kind=PageKind.RUN))
 
 
 @pytest.fixture(autouse=True)
