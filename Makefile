@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel compare-wheel test-arm \
+.PHONY: demo test lint-and-test-cpp last-checks bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel compare-wheel test-arm \
   test-demo install developer python clean test-cpp test-python help always
 
 help:
@@ -75,9 +75,21 @@ test-demo: | packages-bare-tree
 	@$(PYTHON) scripts/test_demo.py || [ $$? -eq 77 ] # 77: not possible here
 
 # ---- tests ---------------------------------------------------------------------------------------
+TYPES := $(BIN)/mypy
+STUBS := $(BIN)/python scripts/generate_stubs.py --check
+DOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+
 # All packages at once; each of the others installs its own if it is called alone.
-test: packages-package+cpp-tests+lint+docs+browser lint test-cpp test-python types stubs docs
+test: packages-package+cpp-tests+lint+docs+browser lint-and-test-cpp test-python last-checks
 	@echo "All tests passed."
+
+# Python packages are downloaded while the compiler works.
+lint-and-test-cpp:
+	@printf '%s\n' lint test-cpp | xargs -P 2 -n 1 $(MAKE) --no-print-directory
+
+# Each of them uses one processor.
+last-checks: install developer | packages-docs
+	@printf '%s\n' '$(TYPES)' '$(STUBS)' '$(DOCS)' | xargs -d '\n' -P $(JOBS) -n 1 sh -c
 
 test-cpp: | packages-package+cpp-tests
 	@mkdir -p build
@@ -96,15 +108,15 @@ lint: developer | packages-lint
 	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format --dry-run -Werror
 
 types: install developer
-	@$(BIN)/mypy
+	@$(TYPES)
 
 # The stubs of the C++ extension are part of the source; they must say what the build says.
 stubs: install developer
-	@$(BIN)/python scripts/generate_stubs.py --check
+	@$(STUBS)
 
 # The documentation site; a warning fails.
 docs: install developer | packages-docs
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@$(DOCS)
 	@echo "The documentation is in build/site/index.html."
 
 # Slow (minutes), so not part of `make test`. clang cannot read the headers that GCC has compiled, and knows not all

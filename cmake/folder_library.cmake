@@ -37,17 +37,19 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # and most sources never need more.
   target_compile_options(orbslam_options INTERFACE "SHELL:--param ggc-min-heapsize=400000")
 endif()
+# Of the folders' libraries alone. The programs of the tests are linked to them as they are compiled without
+# sanitizers (tests/cpp/CMakeLists.txt).
+add_library(orbslam_sanitizers INTERFACE)
 if(ORBSLAM2PY_SANITIZE)
-  target_compile_options(orbslam_options INTERFACE
+  target_compile_options(orbslam_sanitizers INTERFACE
     -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
-    # These checks of each dereferenced pointer double the compile time. The address sanitizer finds
-    # invalid pointers as well.
-    -fno-sanitize=null,alignment,object-size,vptr
+    # These checks of each pointer double the compile time. The address sanitizer finds invalid pointers as well.
+    -fno-sanitize=null,alignment,object-size,pointer-overflow,vptr
     -Wno-maybe-uninitialized)  # GCC 12 reports false ones inside instrumented library headers
   target_link_options(orbslam_options INTERFACE -fsanitize=${ORBSLAM2PY_SANITIZE})
   # Under the address sanitizer Eigen aligns memory itself, but not in libceres, which was compiled
   # without: what one allocates the other could not free.
-  target_compile_definitions(orbslam_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  target_compile_definitions(orbslam_sanitizers INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 # Parsing Eigen is most of what a small file costs the compiler.
@@ -74,11 +76,18 @@ function(orbslam_folder NAME)
   list(TRANSFORM ARG_DEPENDS PREPEND orbslam_ OUTPUT_VARIABLE depends)
   if(sources)
     add_library(orbslam_${NAME} STATIC ${sources})
+    set(archives orbslam_${NAME})
+    foreach(folder ${depends})
+      get_target_property(theirs ${folder} ORBSLAM2PY_ARCHIVES)
+      list(APPEND archives ${theirs})
+    endforeach()
+    list(REMOVE_DUPLICATES archives)
+    set_target_properties(orbslam_${NAME} PROPERTIES ORBSLAM2PY_ARCHIVES "${archives}")
     if(ARG_SEPARATE)
       set_target_properties(orbslam_${NAME} PROPERTIES UNITY_BUILD OFF)
     endif()
     target_link_libraries(orbslam_${NAME} PUBLIC ${depends} ${ARG_PUBLIC}
-      PRIVATE orbslam_options ${ARG_PRIVATE})
+      PRIVATE orbslam_options orbslam_sanitizers ${ARG_PRIVATE})
     target_include_directories(orbslam_${NAME} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
     if(NAME STREQUAL "base")
       target_precompile_headers(orbslam_base PRIVATE ${ORBSLAM2PY_EIGEN_HEADERS})

@@ -11,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from orbslam2py._files import atomic_write
 from orbslam2py.runs import outputs
+from orbslam2py.runs.report_page.markup import Markup
+from orbslam2py.runs.report_page.page import PageKind, whole_page
 from support.data import shared_folder
 from support.rendered_once import render_once
 from support.watchdog import watchdog, worker_threads
@@ -77,6 +80,18 @@ def _no_picture_of_a_run(request: pytest.FixtureRequest, monkeypatch: pytest.Mon
     """Leave out what takes longest in a short run, but with ``@pytest.mark.picture``."""
     if request.node.get_closest_marker("picture") is None:
         monkeypatch.setattr(outputs, "draw_run", lambda path, *_: path.write_bytes(PNG_BEGIN))
+
+
+def _write_empty_page(path: Path, *_: object) -> None:
+    with atomic_write(path) as stream:
+        stream.write(whole_page("", "", [], Markup(""), Markup(""), kind=PageKind.RUN))
+
+
+@pytest.fixture(autouse=True)
+def _no_page_of_a_run(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the page as well, a quarter of a short run, but with ``@pytest.mark.page``."""
+    if request.node.get_closest_marker("page") is None:
+        monkeypatch.setattr(outputs, "write_report_page", _write_empty_page)
 
 
 @pytest.fixture(scope="session")

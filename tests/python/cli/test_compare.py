@@ -13,6 +13,8 @@ from orbslam2py.runs.report_page import compare_runs
 from support.command_line import CommandLine
 from support.made_up_runs import made_up_run
 
+pytestmark = pytest.mark.page
+
 
 @pytest.fixture
 def pair(tmp_path: Path) -> tuple[Path, Path]:

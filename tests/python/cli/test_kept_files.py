@@ -19,7 +19,7 @@ from support.files import names_in
 from support.made_up_saved import map_file
 from support.small_sequences import sequence
 
-pytestmark = pytest.mark.watchdog(60)
+pytestmark = [pytest.mark.watchdog(60), pytest.mark.page]
 
 N = 12
 MINE = "my own work\n"

@@ -41,11 +41,12 @@ NOT_RUN = {
 }
 
 
-#: What is added to the examples of long commands.
+#: What is added to the examples of long commands in the help; in documents to `demo` alone.
 SHORTER = {
     "batch": "--workers 0",
     "benchmark": "--workers 0 --max-frames 3 --seeds 1",
     "demo": "--frames 12",
+    "run": "--max-frames 12",
     "synthesize": "--frames 20 --size 320x240",
 }
 

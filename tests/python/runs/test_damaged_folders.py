@@ -14,6 +14,8 @@ from orbslam2py.runs.report_page.run_folder import read_run
 from support.command_line import CommandLine, logging_restored
 from support.made_up_runs import made_up_run
 
+pytestmark = pytest.mark.page
+
 #: Words of Python's that nobody who runs a program knows.
 INTERNALS = re.compile(r"unpack|index out of range|could not convert|invalid literal|KeyError|None")
 

@@ -16,7 +16,7 @@ from orbslam2py.runs import FinishedRun, FrameRow, RunOptions
 from orbslam2py.runs.outputs import prepare_output_folder
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
-pytestmark = pytest.mark.watchdog(60)
+pytestmark = [pytest.mark.watchdog(60), pytest.mark.page]
 
 N, FAILS_AT = 6, 3
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from orbslam2py import InertialState
 from orbslam2py.runs import RunOptions, SequenceRunner, SystemOptions
@@ -15,6 +16,8 @@ from orbslam2py.runs.report import make_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings import read_imu_settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+
+pytestmark = pytest.mark.page
 
 OPTIONS = SyntheticOptions(world="room", sensor="rgbd", frames=6, size=(320, 240), imu=True)
 

@@ -18,7 +18,7 @@ from orbslam2py.slam.records import Reason, TrackingRecord
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.cameras import Camera
 
-pytestmark = pytest.mark.watchdog(60)
+pytestmark = [pytest.mark.watchdog(60), pytest.mark.page]
 
 SEQUENCE = SyntheticSequence(SyntheticOptions(sensor=Sensor.RGBD, world="room", frames=6))
 KEYFRAME = TrackingRecord(

@@ -12,6 +12,8 @@ from orbslam2py.runs.report_page import compare_runs, write_comparison
 from support.browser import Browser, Page
 from support.made_up_runs import made_up_run
 
+pytestmark = pytest.mark.page
+
 #: Every drawing has marks of some size; the solid one pixels that are not its ground.
 EMPTY_DRAWINGS = """[...document.querySelectorAll("figure.plot svg, svg.boxplot")].filter((svg) => {
   const marks = [...svg.querySelectorAll("path, rect")].filter((mark) => !mark.closest(".grid"));

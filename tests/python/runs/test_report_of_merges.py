@@ -15,6 +15,8 @@ from orbslam2py.runs.report_page.run_folder import read_run
 from orbslam2py.runs.report_page.story import Event, Story
 from support.made_up_runs import made_up_run
 
+pytestmark = pytest.mark.page
+
 #: Map 0, lost, map 1, which is found to be part of map 0.
 STATES = "k" * 12 + "lll" + "k" * 25
 MAPS = "0" * 15 + "1" * 15 + "0" * 10

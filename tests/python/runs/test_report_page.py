@@ -31,6 +31,8 @@ from orbslam2py.runs.report_page.story import Story
 from support.documents import ROOT, cells_of, read
 from support.made_up_runs import made_up_run
 
+pytestmark = pytest.mark.page
+
 
 class Page(HTMLParser):
     """What is in a page: ids, elements, text, links within it."""

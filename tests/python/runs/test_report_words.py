@@ -14,7 +14,7 @@ from orbslam2py.runs.report_page.explained import STAGES_BESIDE
 from support.documents import ROOT
 from support.made_up_runs import made_up_run
 
-pytestmark = pytest.mark.watchdog(60)
+pytestmark = [pytest.mark.watchdog(60), pytest.mark.page]
 
 
 def changed(run: Path, **more: object) -> str:

@@ -22,7 +22,7 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.made_up_runs import made_up_run
 from support.made_up_saved import made_up_saved
 
-pytestmark = pytest.mark.watchdog(60)
+pytestmark = [pytest.mark.watchdog(60), pytest.mark.page]
 
 
 def n_pixels(path: Path, colour: Colour) -> int:

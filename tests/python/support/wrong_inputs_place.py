@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import stat
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -91,12 +94,21 @@ def _write_images(place: Path) -> None:
 def inventory(place: Path) -> dict[str, str]:
     """All files with their content, all folders and links."""
     found = {}
-    for path in sorted(place.rglob("*")):
-        name = str(path.relative_to(place))
-        if path.is_symlink():
-            found[name] = f"link to {path.readlink()}"
-        elif path.is_file():
-            found[name] = hashlib.blake2b(path.read_bytes()).hexdigest()
-        else:
-            found[name] = "folder"
+    for folder, folders, files in os.walk(place):
+        for name in (*folders, *files):
+            path = os.path.join(folder, name)  # noqa: PTH118 - much quicker than Path
+            status = os.lstat(path)
+            if stat.S_ISLNK(status.st_mode):
+                content = f"link to {os.readlink(path)}"  # noqa: PTH115
+            elif stat.S_ISREG(status.st_mode):
+                content = _digest(path, status.st_ino, status.st_size, status.st_ctime_ns)
+            else:
+                content = "folder"
+            found[os.path.relpath(path, place)] = content
     return found
+
+
+@cache
+def _digest(path: str, *_: int) -> str:
+    """Of the content; whatever changes a file changes its number, size or time of change."""
+    return hashlib.blake2b(Path(path).read_bytes()).hexdigest()

@@ -84,9 +84,9 @@ def test_entry(
     done = command(*shlex.split(entry.arguments))
     told = in_one_line(done.err)
     made = inventory(filled)
-    for path in sorted(filled.rglob("*"), reverse=True):
-        if str(path.relative_to(filled)) not in before:
-            path.unlink() if path.is_file() or path.is_symlink() else shutil.rmtree(path)
+    for name in sorted(made.keys() - before.keys(), reverse=True):
+        path = filled / name
+        path.unlink() if path.is_file() or path.is_symlink() else shutil.rmtree(path)
     assert done.code == entry.code, told
     assert entry.thing in told
     assert entry.remedy in told
