@@ -24,7 +24,7 @@ from orbslam2py.slam.inertial_config import InertialConfig
 USUAL_FEATURES, LEAST_SHARE = 1000, 0.6
 _INLIERS = (
     *("tracking.local_map_inliers", "tracking.scarce_inliers"),
-    *("relocalization.enough", "relocalization.enough_near", "relocalization.narrow"),
+    *("relocalization.enough", "relocalization.narrow"),
 )
 
 
@@ -212,11 +212,9 @@ class KeyframeConfig:
     excluded, pixels."""
     inliers: int = 15
     """A keyframe needs more inliers than this (ORB-SLAM)."""
-    spacing: int = 1
-    """Fewest frames from one keyframe to the next with a single camera."""
     spacing_with_depth: int = 2
-    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is
-    not weak."""
+    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is not
+    weak; with a single camera it is one."""
 
 
 @dataclass(frozen=True)
@@ -234,11 +232,9 @@ class RelocalizationConfig:
     """Fewest inliers of a pose that is refined with further matches (ORB-SLAM)."""
     enough: int = 50
     """Inliers of a successful relocalization (ORB-SLAM)."""
-    enough_near: int = 30
-    """The same at the pose where tracking was just lost, or where the motion led."""
     narrow: int = 30
-    """With more inliers than this, but too few, a narrow window is searched as well
-    (ORB-SLAM)."""
+    """With more inliers than this, but too few, a narrow window is searched as well (ORB-SLAM). At
+    the pose where tracking was just lost, or where the motion led, so many are enough."""
     wide_window: float = 10.0
     """Search radius of the first refinement, pixels at level 0 (ORB-SLAM)."""
     wide_distance: int = 100
@@ -332,9 +328,6 @@ class AlignmentConfig:
     tracked_inliers: int = 200
     """Most inliers of a tracked frame that are aligned before its last pose optimization;
     0: none."""
-    noise: float = 0.0
-    """Standard deviation of an aligned sighting over that of a corner; 0: as patches and
-    residuals say."""
 
     def for_sensor(self, sensor: Sensor) -> AlignmentConfig:
         """Return the values in use with a sensor."""

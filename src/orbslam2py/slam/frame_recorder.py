@@ -108,20 +108,19 @@ class FrameRecorder:
     def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         """Record a frame that is later than all others."""
         self._write(frame, lost=lost, fixed_map=fixed_map)
-        if not lost and frame.map_index != self._young_map:
-            self._young = None
-        if self._young is not None:
+        if self._young is None:
+            return
+        if lost or frame.map_index == self._young_map:
             self._young.append(_YoungFrame(frame, lost, fixed_map))
+        else:
+            self._young = None
 
     def _write(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         """Record a frame in place of its earlier record."""
-        self._recorder.record(self._map, frame, lost=lost)
-        if lost or fixed_map:
-            self._sightings.forget(frame.id)
-        else:
-            self._sightings.keep(frame)
-            self._sightings.settle(self._map, self._recorder, _MOST_WAITING)
-        self._last_map = max(self._last_map, frame.map_index)
+        recorded_in = self._sightings.record(
+            self._map, self._recorder, frame, lost, not fixed_map, _MOST_WAITING
+        )
+        self._last_map = max(self._last_map, recorded_in)
 
     def doubt(self, frame: core.TrackedFrame) -> None:
         """Withdraw the pose of the frame that is recorded next, if the frame after it is lost."""
@@ -153,9 +152,7 @@ class FrameRecorder:
             self._record_waiting(believed=not lost)
             if frame is self._doubted:
                 # A copy: the frame itself goes on following the map while others may read.
-                self._waiting = core.TrackedFrame(frame.features)
-                self._waiting.T_cw = frame.T_cw
-                self._waiting.share_anchor(frame)
+                self._waiting = frame.pose_alone()
             else:
                 self._append(frame, lost=lost, fixed_map=fixed_map)
             self._doubted = None

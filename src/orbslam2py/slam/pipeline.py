@@ -237,7 +237,8 @@ class Pipeline:
             self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
-        self.inertial.look(interval, record, frame.big_change)
+        if self.inertial.check is not None:
+            self.inertial.look(interval, record, frame.big_change)
         self._announce(state_before, record)
         self.back_end.mapping.start()
         for watch in watchers:
@@ -288,9 +289,9 @@ class Pipeline:
     def _look_again_at_start(self) -> None:
         """Estimate the first frames of a single camera's map again, once this map has settled."""
         n_young = self.recorder.n_young
-        slam_map = self.back_end.map
-        settled = slam_map.n_keyframes_of(slam_map.active_map) > _SETTLED_MAP
-        if n_young > 0 and (settled or n_young >= _YOUNG_FRAMES):
+        if n_young >= _YOUNG_FRAMES or (
+            n_young > 0 and self.back_end.map.n_active_keyframes > _SETTLED_MAP
+        ):
             self.recorder.reestimate_first_frames()
 
     def _take_samples(self, timestamp: float) -> ImuInterval | None:
@@ -329,13 +330,14 @@ class Pipeline:
     ) -> TrackingRecord:
         ok = outcome.state is TrackingState.OK
         estimate = outcome.estimate
+        T_cw = frame.T_cw if ok else None
         return TrackingRecord(
-            frame_id=frame.id,
-            timestamp=frame.timestamp,
+            frame_id=self._next_frame_id - 1,
+            timestamp=self._last_timestamp,
             map_index=frame.map_index if ok else self.back_end.map.active_map,
             state=outcome.state,
             reason=estimate.reason,
-            T_cw=frame.T_cw.matrix if ok and frame.T_cw is not None else None,
+            T_cw=T_cw.matrix if T_cw is not None else None,
             covariance=estimate.covariance if ok else None,
             n_matches=estimate.n_matches,
             n_inliers=estimate.n_inliers if ok else 0,

@@ -267,9 +267,10 @@ class Tracking:
         else:
             with timer("keyframe"):
                 is_keyframe = self._extend_map(frame, estimate)
-        # Outliers went into the keyframe, where bundle adjustment decides about them; the next
-        # frame must not start from them.
-        frame.discard_outliers()
+        if not self._has_depth:
+            # Outliers went into the keyframe, where bundle adjustment decides about them; the next
+            # frame must not start from them.
+            frame.discard_outliers()
         return TrackingResult(self._state.phase, estimate, is_keyframe, inliers=inliers)
 
     def _follow_imu(
@@ -385,8 +386,7 @@ class Tracking:
     @property
     def _is_small(self) -> bool:
         """Return whether the map is dropped if tracking is lost."""
-        active = self._map.active_map
-        n_keyframes = self._map.n_keyframes_of(active) - self._initializer.n_between(active)
+        n_keyframes = self._map.n_active_keyframes - self._initializer.n_between()
         return bool(n_keyframes <= self._search.limits.small_map)
 
     # ---- keyframes -------------------------------------------------------------------------------

@@ -118,10 +118,7 @@ class PoseAcceptance:
                 state = state.relocalized(frame.id)
                 state = replace(state, motion=state.motion.jumped(None))
         state = self._search.settle(refined, state, fixed_map=fixed_map)
-        innovation = state.motion.innovation(frame)
-        covariance = self._judge.stated_covariance(
-            refined, evidence.match_error, state.motion, innovation
-        )
+        covariance = self._judge.stated_covariance(refined, evidence.match_error, state.motion)
         estimate = replace(
             refined.estimate, evidence=evidence, method=hypothesis.method, covariance=covariance
         )
