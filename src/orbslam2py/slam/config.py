@@ -151,22 +151,9 @@ class AcceptanceConfig:
     sudden_share: float = 0.6
     """Other hypotheses are searched below this share of the mean inliers, or of the mean
     visibility ratio."""
-    sudden_deviation: float = 2.5
-    """Other hypotheses are searched when the position's deviation is this factor above its
-    mean."""
-    surprise_windows: float = 1.0
-    """Other hypotheses are searched when the rotation differs from the prediction by this
-    number of search windows."""
     weak_share: float = 0.5
     """A pose is uncertain below this share of the mean inliers and of the mean visibility
     ratio."""
-    weak_cells: int = 4
-    """A pose is uncertain when its inliers lie in this number of the 48 cells of the image
-    or fewer."""
-    weak_deviation: float = 4.0
-    """A pose is uncertain when the position's deviation is this factor above its mean."""
-    weak_error: float = 1.5
-    """A pose is uncertain when the median reprojection error is this factor above its mean."""
     refused_share: float = 0.3
     """A pose is rejected below this share of the mean inliers, unless a second method
     confirms it."""
@@ -306,9 +293,8 @@ class TrajectoryConfig:
     """How the poses of past frames are refined."""
 
     rematch_every_frame: bool = False
-    """Match every frame with the map once more when that has settled, not only uncertain ones."""
-    rematch_uncertain: bool = True
-    """Match uncertain frames with the map once more when that has settled."""
+    """Match every frame with the map once more when that has settled, not only the first ones of a
+    single camera's map."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,6 @@ from orbslam2py.slam.records import (
     TrackingRecord,
     TrackingResult,
     TrackingState,
-    Verdict,
 )
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.rig_front_end import RigFrontEnd, front_end_of
@@ -125,7 +124,6 @@ class Pipeline:
             back_end.map,
             FrameReestimation(back_end.map, _make_search(setup, back_end, config)),
             every_frame=config.trajectory.rematch_every_frame,
-            uncertain_frames=config.trajectory.rematch_uncertain,
         )
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()
@@ -309,15 +307,12 @@ class Pipeline:
                 _log.info("lost soon after initialization; starting a new map")
             self._given_up = outcome.given_up
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
-            evidence = outcome.estimate.evidence
             if outcome.earlier:
                 self.recorder.begin(outcome.earlier)
             self.recorder.record(
                 frame,
                 lost=outcome.state is TrackingState.LOST,
                 fixed_map=self.localization.on,
-                in_doubt=evidence is not None
-                and (evidence.doubted or evidence.verdict is Verdict.WEAK),
             )
 
     def _record(

@@ -267,10 +267,9 @@ class Tracking:
         else:
             with timer("keyframe"):
                 is_keyframe = self._extend_map(frame, estimate)
-        if not self._has_depth:
-            # Outliers went into the keyframe, where bundle adjustment decides about them; the next
-            # frame must not start from them.
-            frame.discard_outliers()
+        # Outliers went into the keyframe, where bundle adjustment decides about them; the next
+        # frame must not start from them.
+        frame.discard_outliers()
         return TrackingResult(self._state.phase, estimate, is_keyframe, inliers=inliers)
 
     def _follow_imu(

@@ -111,9 +111,9 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
         assert recorder.n_young == 0
         recorder.settle()
         finished = recorder.trajectories()[0]
-    assert moved.seen[:3] == [(0, False), (1, False), (2, False)]
+    assert moved.seen[:3] == [0, 1, 2]
     # Once more when the map is finished, from where they were found.
-    assert moved.seen[3:] == [(0, False), (1, False)]
+    assert moved.seen[3:] == [0, 1]
     assert moved.finished == [False] * 3 + [True] * 2
     assert list(after.lost) == list(finished.lost) == [False, False, True]
     assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -257,9 +256,7 @@ class FakeCore:
     def PointBatch(self) -> str:
         return "no points"
 
-    def follow_map(
-        self, world: FakeMap, frame: FakeFrame
-    ) -> tuple[str, float, _core.Pose | None]:
+    def follow_map(self, world: FakeMap, frame: FakeFrame) -> tuple[str, float, _core.Pose | None]:
         assert frame.T_cw is not None
         before, big_change = frame.T_cw, frame.big_change
         frame.T_cw = before @ pose(world.keyframe_x - frame.anchor_x)
@@ -400,12 +397,7 @@ class FakeInitializer:
 #: Whatever is found is believed.
 CREDULOUS = AcceptanceConfig(
     sudden_share=0,
-    sudden_deviation=math.inf,
-    surprise_windows=math.inf,
     weak_share=0,
-    weak_cells=-1,
-    weak_deviation=math.inf,
-    weak_error=math.inf,
     refused_share=0,
 )
 

@@ -124,7 +124,7 @@ class PoseAcceptance:
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE), state
-        scene = state.scene.with_error(evidence.match_error, self._judge.limits)
+        scene = state.scene.with_error(evidence.match_error)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence, state):
             scene = scene.with_pose(statistics_of(refined))
         return estimate, replace(state, scene=scene)

@@ -64,12 +64,7 @@ class PoseValidator:
         verdict = Verdict.STRONG
         if inliers_to_usual < limits.refused_share and estimate.n_inliers < limits.refused_inliers:
             verdict = Verdict.REFUSED
-        elif (
-            max(inliers_to_usual, found_to_usual) < limits.weak_share
-            or cells <= limits.weak_cells
-            or deviation_to_usual > limits.weak_deviation
-            or scene.is_sudden_error(match_error, limits)
-        ):
+        elif max(inliers_to_usual, found_to_usual) < limits.weak_share:
             verdict = Verdict.WEAK
         return Evidence(
             verdict=verdict,
@@ -91,13 +86,8 @@ class PoseValidator:
 
     def needs_reestimation(self, evidence: Evidence) -> bool:
         """Return whether other methods must search the pose before it is accepted."""
-        limits = self.limits
-        return (
-            evidence.verdict is not Verdict.STRONG
-            or min(evidence.inliers_to_usual, evidence.found_to_usual) < limits.sudden_share
-            or evidence.deviation_to_usual > limits.sudden_deviation
-            or self._windows(evidence.turn_change) > limits.surprise_windows
-        )
+        least = min(evidence.inliers_to_usual, evidence.found_to_usual)
+        return evidence.verdict is not Verdict.STRONG or least < self.limits.sudden_share
 
     def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
         """Return whether two poses of a frame are equal within their uncertainty."""
@@ -106,7 +96,10 @@ class PoseValidator:
             return False
         turn, move = T_first.difference(T_second)
         deviations = first.position_deviation + second.position_deviation
-        return self._windows(math.degrees(turn)) < _SAME_WINDOWS and move <= _SAME_DEVIATIONS * deviations
+        return (
+            self._windows(math.degrees(turn)) < _SAME_WINDOWS
+            and move <= _SAME_DEVIATIONS * deviations
+        )
 
     def confirm(self, evidence: Evidence) -> Evidence:
         """A second method found the same pose: accept it, but weak evidence stays weak."""

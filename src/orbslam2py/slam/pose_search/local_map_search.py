@@ -107,11 +107,11 @@ class LocalMapSearch:
         if just_begun:
             window = self._limits.local_map_window_after_relocalization
         visible, n_predicted = core.match_local_map(frame, local_map, first.discarded, window)
-        if just_begun and state.found_again:
+        found_again = just_begun and state.found_again
+        if found_again and core.optimize_pose(frame).n_inliers >= self._limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
-            if core.optimize_pose(frame).n_inliers >= self._limits.map_matches:
-                frame.discard_outliers()
-                core.match_local_map(frame, local_map, first.discarded, self._usual_window)
+            frame.discard_outliers()
+            core.match_local_map(frame, local_map, first.discarded, self._usual_window)
         estimate = self._optimized(frame, first, state.motion.prior())
         if estimate.visual_odometry:
             return _beyond_the_map(frame, estimate, state)
