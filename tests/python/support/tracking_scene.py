@@ -313,7 +313,7 @@ class FakeCore:
         return found.n_inliers, found.covariance, frame.discard_outliers()
 
     def optimize_aligned(
-        self, world: FakeMap, frame: FakeFrame, most: int, noise: float, fewest: int
+        self, world: FakeMap, frame: FakeFrame, most: int, fewest: int
     ) -> tuple[int, int, int, np.ndarray]:
         found = self.optimize_pose(frame)
         return found.n_inliers, frame.n_associated(), frame.n_map_inliers(), found.covariance
