@@ -89,7 +89,9 @@ class CoreClock:
                 if type(member) is property:
                     setattr(kind, name, property(self.timed(member.fget), member.fset))
                 elif name in ("__init__", "__matmul__") or (
-                    not name.startswith("_") and not isinstance(member, staticmethod)
+                    not name.startswith("_")
+                    and callable(member)
+                    and not isinstance(member, staticmethod)
                 ):
                     setattr(kind, name, self.timed(member))
 

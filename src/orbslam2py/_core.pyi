@@ -3650,7 +3650,7 @@ def camera_models() -> list[tuple[str, list[str], list[str]]]:
     """
     Name, other programs' names and parameter names of each camera model.
     """
-def change_from_prediction(frame: TrackedFrame, last: TrackedFrame, velocity: Velocity) -> tuple[float, float]:
+def change_from_prediction(frame: TrackedFrame, last: TrackedFrame, velocity: Velocity | None = None) -> tuple[float, float]:
     """
     (angle [rad], distance of the centres) between the pose of a frame and the predicted one;
     zero without a pose of either frame, or without a velocity.
@@ -4051,7 +4051,7 @@ def poses_of_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex) -> 
     """
     Copy the poses of the published keyframes of a map.
     """
-def predict_pose(frame: TrackedFrame, last: TrackedFrame, velocity: Velocity) -> None:
+def predict_pose(frame: TrackedFrame, last: TrackedFrame, velocity: Velocity | None = None) -> None:
     """
     Set the pose of a frame by constant velocity; without one, to that of the last frame.
     Raises StateError when the last frame has no pose.
@@ -4153,7 +4153,7 @@ def stamp_of(map: Map) -> MapStamp:
     """
     The present moment.
     """
-def stated_covariance(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], factor: typing.SupportsFloat | typing.SupportsIndex, frame: TrackedFrame, last: TrackedFrame, velocity: Velocity, map_motion: Pose, wrong_share: typing.SupportsFloat | typing.SupportsIndex) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+def stated_covariance(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], factor: typing.SupportsFloat | typing.SupportsIndex, frame: TrackedFrame, last: TrackedFrame, velocity: Velocity | None = None, map_motion: Pose | None = None, wrong_share: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
     """
     `factor` times a covariance (6, 6), plus that of the motion of the map under the last frame
     since it was tracked, and `wrong_share` times that of the innovation.

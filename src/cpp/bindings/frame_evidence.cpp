@@ -85,7 +85,7 @@ void bind_velocity(py::module_& module) {
              "None unless the second is the next image and no loop has been closed between them.");
   module.def(
       "predict_pose", &predict_pose, py::arg("frame"), py::arg("last"),
-      py::arg("velocity").none(true),
+      py::arg("velocity").none(true) = py::none(),
       "Set the pose of a frame by constant velocity; without one, to that of the last frame.\n"
       "Raises StateError when the last frame has no pose.");
 }
@@ -97,7 +97,7 @@ void bind_innovation(py::module_& module) {
         const PoseChange change = change_from_prediction(frame, last, velocity);
         return std::make_tuple(change.turn, change.move);
       },
-      py::arg("frame"), py::arg("last"), py::arg("velocity").none(true),
+      py::arg("frame"), py::arg("last"), py::arg("velocity").none(true) = py::none(),
       "(angle [rad], distance of the centres) between the pose of a frame and the predicted one;\n"
       "zero without a pose of either frame, or without a velocity.");
   module.def(
@@ -109,7 +109,8 @@ void bind_innovation(py::module_& module) {
                                  {velocity, map_motion, wrong_share});
       },
       py::arg("covariance"), py::arg("factor"), py::arg("frame"), py::arg("last"),
-      py::arg("velocity").none(true), py::arg("map_motion").none(true), py::arg("wrong_share"),
+      py::arg("velocity").none(true) = py::none(), py::arg("map_motion").none(true) = py::none(),
+      py::arg("wrong_share") = 0.0,
       "`factor` times a covariance (6, 6), plus that of the motion of the map under the last "
       "frame\n"
       "since it was tracked, and `wrong_share` times that of the innovation.");

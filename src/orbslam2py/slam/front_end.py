@@ -245,8 +245,9 @@ class FrontEnd:
         *,
         rectifier: core.PairRectifier | None = None,
     ) -> core.Frame:
-        kept = (left, right) if self._keep_images else (None, None)
-        core.keep_pixels(frame, image, self._settings.camera.rgb, grey, *kept, rectifier)
+        kept = left if self._keep_images else None
+        is_rgb = self._settings.camera.rgb
+        core.keep_pixels(frame, image, is_rgb, grey, kept, right, rectifier)
         return frame
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
