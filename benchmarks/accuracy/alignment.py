@@ -36,7 +36,6 @@ SWITCHES: dict[str, tuple[str, ...]] = {
     "frames": (*ON, *NO_KEYFRAMES),
     "both": ON,
     "all": (*ON, *RIGHT),
-    "both, noise 1": (*ON, "alignment.noise=1"),
 }
 RECORDED = [
     ("TUM desk", "tum_fr1_desk_rgb110", "mono"),

@@ -986,6 +986,10 @@ class TrackedFrame:
         """
         Number of inliers that are points of the map, not temporary ones.
         """
+    def pose_alone(self) -> TrackedFrame:
+        """
+        Another version of this frame with its pose, without associations.
+        """
     def share_anchor(self, other: TrackedFrame) -> None:
         """
         The pose was predicted from that of another frame.
@@ -1099,25 +1103,29 @@ class ImageRotation:
         """
         Rotation of directions of the first camera into the second, (4,) float64.
         """
-class InlierSpread:
+class Velocity:
     """
-    Result of spread_of_inliers().
+    A velocity, constant in the axes of the camera: the motion over an interval.
     """
+    def __init__(self, step: Pose, seconds: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    def over(self, seconds: typing.SupportsFloat | typing.SupportsIndex) -> Pose:
+        """
+        The motion over another interval [s]; over more than a second, that over a second.
+        """
+    def scaled(self, factor: typing.SupportsFloat | typing.SupportsIndex) -> Velocity:
+        """
+        The velocity after lengths have been multiplied by a factor.
+        """
     @property
-    def cells(self) -> int:
+    def seconds(self) -> float:
         """
-        Of 48 cells of the image that hold an inlier.
-        """
-    @property
-    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
-        """
-        (6, 6) cluster-robust covariance of the pose: rotation [rad], translation [m].
-        Zero where it is not determined.
+        The interval; negative where frames are tracked backwards in time.
         """
     @property
-    def octaves(self) -> int:
+    def step(self) -> Pose:
         """
-        Of depth that hold an inlier.
+        Motion over the interval, `T_cl`.
         """
 class Map:
     """
@@ -1342,6 +1350,11 @@ class Map:
     def maps(self) -> list[int]:
         """
         The maps that hold keyframes, ascending: the oldest first.
+        """
+    @property
+    def n_active_keyframes(self) -> int:
+        """
+        Number of published keyframes of the active map.
         """
     @property
     def n_keyframes(self) -> int:
@@ -2565,6 +2578,11 @@ class FrameSightings:
         """
         Keep the inliers of a frame, in place of what was kept of it before.
         """
+    def record(self, map: Map, recorder: TrajectoryRecorder, frame: TrackedFrame, lost: bool, keep: bool, n_youngest: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Record a frame, keep what it saw (`keep`, and not lost), and settle all but the
+        youngest frames. Returns the map of the frame.
+        """
     def settle(self, map: Map, recorder: TrajectoryRecorder, n_youngest: typing.SupportsInt | typing.SupportsIndex = 0) -> int:
         """
         Estimate the recorded poses of all but the youngest frames anew from the points as
@@ -3663,6 +3681,11 @@ def camera_models() -> list[tuple[str, list[str], list[str]]]:
     """
     Name, other programs' names and parameter names of each camera model.
     """
+def change_from_prediction(frame: TrackedFrame, last: TrackedFrame, velocity: Velocity | None = None) -> tuple[float, float]:
+    """
+    (angle [rad], distance of the centres) between the pose of a frame and the predicted one;
+    zero without a pose of either frame, or without a velocity.
+    """
 def changed_since(map: Map, since: MapStamp) -> ChangedIds:
     """
     Keyframes and points that have changed since a moment, but for the counters of the
@@ -3717,6 +3740,11 @@ def count_sightings(map: Map, frame: TrackedFrame, in_view: typing.Annotated[num
 def count_staying(frame: TrackedFrame, T_nw: Pose) -> int:
     """
     How many inliers of a frame a camera at `T_nw` would still have in its image.
+    """
+def count_staying_after(frame: TrackedFrame, velocity: Velocity, n_intervals: typing.SupportsFloat | typing.SupportsIndex) -> int:
+    """
+    How many inliers of a frame are still in its image after so many intervals of a
+    velocity. Raises StateError without a pose.
     """
 def count_tracked_points(map: Map, id: int, min_observations: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
@@ -3774,6 +3802,11 @@ def estimate_inertial_start(times: collections.abc.Sequence[typing.SupportsFloat
 
     times, T_wc: of n views, 4 or more. samples: n - 1 arrays (m, 7). T_cb, noise: as of InertialFilter. metric: the unit of the map is the metre. Deviations of the views' rotations [rad] and positions [units of the map]; bias (6,) with the deviations of gyro [rad/s] and accelerometer [m/s^2]: what is known before. known_gravity [rad] and known_scale: deviations of the third axis and of the logarithm of the scale in a map that an IMU has turned upright before; 0: nothing is known. Raises ValueError.
     """
+def estimate_pose(frame: TrackedFrame) -> tuple[int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"], numpy.typing.NDArray[numpy.int64]]:
+    """
+    optimize_pose(), then drop the outliers: (inliers, covariance (6, 6), ids (k,) int64 of the
+    points that were dropped, ascending). Raises StateError without a pose.
+    """
 def figure_eight_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
     The round through make_figure_eight; twice along the middle leg.
@@ -3790,11 +3823,12 @@ def find_relocalization_candidates(index: KeyFrameIndex, map: Map, frame: Frame)
     """
     Keyframes that look like a described frame, by ascending id.
     """
-def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float]:
+def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float, Pose | None]:
     """
     Bring an earlier frame up to date: its pose follows its keyframe, replaced points their
     successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much
-    lengths around the frame have been multiplied since).
+    lengths around the frame have been multiplied since, motion of its pose `T_after @
+    T_before^-1`). The motion is None without a pose, and where a loop has moved the map.
     """
 def follow_points(map: Map, context: FrameContext, earlier: TrackedFrame, T_cw: Pose, grey: numpy.ndarray) -> FollowedPoints:
     """
@@ -3844,14 +3878,14 @@ def join_frames(context: FrameContext, id: typing.SupportsInt | typing.SupportsI
     Frame of a rig from the frames of its cameras, in their order; None: that camera has none.
     The camera of the context is the rig.
     """
-def keep_images(frame: Frame, left: Extraction, right: Extraction | None = None) -> None:
+def keep_pixels(frame: Frame, image: numpy.ndarray, is_rgb: bool, grey: numpy.ndarray | None = None, left: Extraction | None = None, right: Extraction | None = None, rectifier: PairRectifier | None = None) -> None:
     """
-    Keep the image pyramids of a new frame, so that patches can be aligned in them.
-    """
-def keep_small_image(frame: Frame, grey: numpy.ndarray) -> None:
-    """
-    Keeps a new frame's image (h, w) uint8, shrunk to some 1500 pixels, for align_rotation().
-    Raises ImageError for anything but a grey image.
+    Keep of the image of a new frame what later steps need.
+
+    Its colours at the keypoints, of an image (h, w, 3) or (h, w, 4) uint8; with the rectifier
+    of a raw pair it is the raw left one. Where given, the grey image (h, w) uint8, shrunk to
+    some 1500 pixels, for align_rotation(), and the image pyramids of `left` and `right`, in
+    which patches are aligned. Raises ImageError for images of another size or kind.
     """
 def keyframes_of_seam(map: Map, current: int) -> numpy.typing.NDArray[numpy.int64]:
     """
@@ -3938,12 +3972,19 @@ def match_last_frame(current: TrackedFrame, last: TrackedFrame, points: PointBat
     keypoint's scale. `use_depth`: motion along the axis restricts the levels.
     Returns the number of matched keypoints. Raises StateError without poses.
     """
+@typing.overload
 def match_local_map(frame: TrackedFrame, local_points: PointBatch, exclude: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], radius_factor: typing.SupportsFloat | typing.SupportsIndex) -> LocalMapMatches:
     """
     Search the local map's points that the frame does not hold yet.
 
     `exclude`: (n,) int64 ids of points thrown out as outliers earlier in this frame.
     Earlier points have priority. Returns LocalMapMatches. Raises StateError without a pose.
+    """
+@typing.overload
+def match_local_map(frame: TrackedFrame, local_map: LocalMap, exclude: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], radius_factor: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.int64], int]:
+    """
+    The same with a LocalMap. Returns (points in view that were not associated before, (n,)
+    int64; how many points should be in view, with those that were).
     """
 def match_stereo(left: Extraction, right: Extraction, scales: ScalePyramid, bf: typing.SupportsFloat | typing.SupportsIndex, max_disparity: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
     """
@@ -3966,15 +4007,15 @@ def median_displacement(frame: TrackedFrame, T_nw: Pose) -> float:
     Median distance [px] between the projections of a frame's inliers and those into a
     camera at `T_nw`; 0 without any. Raises StateError without a pose.
     """
-def median_match_error(frame: TrackedFrame) -> float:
-    """
-    Median distance between a frame's matched keypoints, outliers too, and the projections
-    of their points, in standard deviations of the keypoints' levels; 0 without any.
-    Raises StateError without a pose.
-    """
 def median_scene_depth(map: Map, id: int) -> float | None:
     """
     Lower median of the depths of a living keyframe's points; None without points.
+    """
+def optimize_aligned(map: Map, frame: TrackedFrame, most: typing.SupportsInt | typing.SupportsIndex, fewest: typing.SupportsInt | typing.SupportsIndex) -> tuple[int, int, int, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]]:
+    """
+    optimize_pose(), and once more with at most `most` aligned inliers (align_frame) where the
+    pose has at least `fewest`; `most` 0: without. Returns (inliers, matches, inliers on points
+    of the map, covariance (6, 6)). Raises StateError without a pose.
     """
 def optimize_essential_graph(correction: LoopCorrection, abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> PoseGraphSummary:
     """
@@ -4032,15 +4073,24 @@ def pose_covariance(frame: TrackedFrame) -> typing.Annotated[numpy.typing.NDArra
     keypoints are taken for. Outliers take no part; zero with fewer than 3 others. Raises
     StateError when the frame has no pose.
     """
+def pose_evidence(frame: TrackedFrame) -> tuple[int, int, float, typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]]:
+    """
+    What a frame's matches say of its pose: (cells, octaves, match error, covariance).
+
+    How many of 48 cells of the image hold an inlier, and how many octaves of depth. The
+    median distance between matched keypoints, outliers too, and the projections of their
+    points, in standard deviations of the keypoints' levels; 0 without any. The (6, 6)
+    cluster-robust covariance of the pose, rotation [rad] and translation; zero where it is
+    not determined. Raises StateError without a pose.
+    """
 def poses_of_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex) -> KeyFramePoses:
     """
     Copy the poses of the published keyframes of a map.
     """
-def position_deviation(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"]) -> float:
+def predict_pose(frame: TrackedFrame, last: TrackedFrame, velocity: Velocity | None = None) -> None:
     """
-    Standard deviation of the position by the covariance (6, 6) of a pose, rotation and
-    translation: all directions together. 0 where the sum of its variances is not
-    positive.
+    Set the pose of a frame by constant velocity; without one, to that of the last frame.
+    Raises StateError when the last frame has no pose.
     """
 def process_new_keyframe(map: Map, id: int, recent: RecentPoints) -> None:
     """
@@ -4075,10 +4125,6 @@ def render(world: World, T_cw: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
 def room_T_wc(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], seconds: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex = 30.0) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
     """
     Camera to world (4, 4) of somebody looking around in a room, once in `period` seconds.
-    """
-def sample_colours(frame: Frame, image: numpy.ndarray, is_rgb: bool, rectifier: PairRectifier | None = None) -> None:
-    """
-    Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; a grey image gives none. With the rectifier of a raw pair the image is the raw left one. Raises ImageError for an image of another size.
     """
 def seed_of(seed: typing.SupportsInt | typing.SupportsIndex, first: typing.SupportsInt | typing.SupportsIndex, second: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
@@ -4139,14 +4185,14 @@ def spread_from_seam(map: Map, before: KeyFramePoses, seam: collections.abc.Sequ
     Spread what an adjustment of the seam has moved over the rest of the map, by a pose graph
     with the relative poses of `before`. Returns whether anything was moved.
     """
-def spread_of_inliers(frame: TrackedFrame) -> InlierSpread:
-    """
-    How a frame's inliers are spread over the image and over depth: InlierSpread.
-    Raises StateError without a pose.
-    """
 def stamp_of(map: Map) -> MapStamp:
     """
     The present moment.
+    """
+def stated_covariance(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], factor: typing.SupportsFloat | typing.SupportsIndex, frame: TrackedFrame, last: TrackedFrame, velocity: Velocity | None = None, map_motion: Pose | None = None, wrong_share: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
+    """
+    `factor` times a covariance (6, 6), plus that of the motion of the map under the last frame
+    since it was tracked, and `wrong_share` times that of the innovation.
     """
 def street_lap_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
@@ -4186,6 +4232,11 @@ def vector_units() -> list[str]:
     """
     Names of the vector units that there are kernels for and this processor has, slowest first.
     """
+def velocity_between(last: TrackedFrame, frame: TrackedFrame, consecutive: bool = False) -> Velocity | None:
+    """
+    The Velocity between two frames; None without a pose of either. With `consecutive`
+    None unless the second is the next image and no loop has been closed between them.
+    """
 def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopVerificationOptions) -> Loop | None:
     """
     Verify by geometry that two keyframes show the same place.
@@ -4193,10 +4244,5 @@ def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopV
     Matches by words, a similarity by RANSAC, guided matching, refinement, projection of
     the points around the candidate. Returns a Loop, or None when a step finds too little or
     a keyframe is dead. The map is not changed.
-    """
-def widened_covariance(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], factor: typing.SupportsFloat | typing.SupportsIndex, errors: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
-    """
-    `factor` times a covariance (6, 6), plus that of independent errors, each of a list
-    given as a tangent (6,) whose length is its standard deviation.
     """
 FIRST_TEMPORARY_POINT: int = 4611686018427387904

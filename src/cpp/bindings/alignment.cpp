@@ -2,6 +2,8 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <tuple>
+
 #include "alignment/align_patch.hpp"
 #include "base/errors.hpp"
 #include "bindings/arrays.hpp"
@@ -199,6 +201,22 @@ void bind_map_alignment(py::module_& module) {
              "Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the\n"
              "sightings tried by AlignmentFailure.");
   bind_followed_points(module);
+  module.def(
+      "optimize_aligned",
+      [](const Map& map, TrackedFrame& frame, std::size_t most, int fewest) {
+        PoseEstimate estimate;
+        {
+          const py::gil_scoped_release release;
+          estimate = optimize_aligned(map, frame, most, 0, fewest);
+        }
+        return std::make_tuple(estimate.n_inliers, frame.n_associated(), frame.n_map_inliers(),
+                               estimate.covariance);
+      },
+      "map"_a, "frame"_a, "most"_a, "fewest"_a,
+      "optimize_pose(), and once more with at most `most` aligned inliers (align_frame) where the\n"
+      "pose has at least `fewest`; `most` 0: without. Returns (inliers, matches, inliers on "
+      "points\n"
+      "of the map, covariance (6, 6)). Raises StateError without a pose.");
   module.def(
       "alignment_noise",
       [](const Map& map) {

@@ -7,7 +7,6 @@
 #include <sstream>
 #include <string>
 
-#include "base/covariance.hpp"
 #include "base/errors.hpp"
 #include "base/pose.hpp"
 #include "base/scale_pyramid.hpp"
@@ -207,17 +206,6 @@ void bind_scale_pyramid(py::module_& module) {
            "Level at which a point is expected that was seen at most `max_distance` away.");
 }
 
-void bind_covariance(py::module_& module) {
-  module.def("position_deviation", &position_deviation, py::arg("covariance"),
-             "Standard deviation of the position by the covariance (6, 6) of a pose, rotation and\n"
-             "translation: all directions together. 0 where the sum of its variances is not\n"
-             "positive.");
-  module.def("widened_covariance", &widened_covariance, py::arg("covariance"), py::arg("factor"),
-             py::arg("errors"),
-             "`factor` times a covariance (6, 6), plus that of independent errors, each of a list\n"
-             "given as a tangent (6,) whose length is its standard deviation.");
-}
-
 void bind_seeds(py::module_& module) {
   module.def(
       "seed_of",
@@ -235,7 +223,6 @@ void bind_seeds(py::module_& module) {
 void bind_base(py::module_& module) {
   register_errors(module);
   bind_pose(module);
-  bind_covariance(module);
   bind_scale_pyramid(module);
   bind_seeds(module);
 }

@@ -5,6 +5,8 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <optional>
+
 #include "base/errors.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
@@ -291,6 +293,15 @@ void bind_tracked_frame(py::module_& module) {
       .def("clear_associations", &TrackedFrame::clear_associations,
            "Removes all map points, positions and outlier flags; keeps the pose.")
       .def(
+          "pose_alone",
+          [](const TrackedFrame& t) {
+            TrackedFrame copy(t.frame);
+            copy.T_cw = t.T_cw;
+            copy.anchor = t.anchor;
+            return copy;
+          },
+          "Another version of this frame with its pose, without associations.")
+      .def(
           "take_over",
           [](TrackedFrame& t, const TrackedFrame& other) {
             if (other.frame != t.frame) {
@@ -420,27 +431,33 @@ void bind_frame(py::module_& module) {
              "Grey image (h, w) uint8 of a grey, colour (h, w, 3) or colour + alpha (h, w, 4) "
              "image; a contiguous grey image comes back itself.");
   module.def(
-      "sample_colours",
-      [](Frame& frame, const py::array& image, bool is_rgb, const PairRectifier* rectifier) {
-        if (!holds<std::uint8_t>(image)) throw ImageError("image must be uint8");
-        const py::array pixels = normal_form(image);
-        const cv::Mat source = view_image(pixels, CV_8U);
+      "keep_pixels",
+      [](Frame& frame, const py::array& image, bool is_rgb, const std::optional<py::array>& grey,
+         const Extraction* left, const Extraction* right, const PairRectifier* rectifier) {
+        const py::array grey_image = grey.value_or(image);
+        if (!holds<std::uint8_t>(image) || !holds<std::uint8_t>(grey_image)) {
+          throw ImageError("image must be uint8");
+        }
+        const py::array pixels = normal_form(image), grey_pixels = normal_form(grey_image);
+        const cv::Mat source = view_image(pixels, CV_8U), whole = view_image(grey_pixels, CV_8U);
         const py::gil_scoped_release release;
-        sample_colours(source, is_rgb, frame, rectifier ? &rectifier->left() : nullptr);
-      },
-      py::arg("frame"), py::arg("image"), py::arg("is_rgb"), py::arg("rectifier") = nullptr,
-      "Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; "
-      "a grey image gives none. With the rectifier of a raw pair the image is the raw left one. "
-      "Raises ImageError for an image of another size.");
-  module.def(
-      "keep_images",
-      [](Frame& frame, const Extraction& left, const Extraction* right) {
-        FrameImages::Pyramids images{left.pyramid, {}};
+        if (grey) frame.small_image = shrink_image(whole);
+        if (source.channels() > 1) {
+          sample_colours(source, is_rgb, frame, rectifier ? &rectifier->left() : nullptr);
+        }
+        if (left == nullptr) return;
+        FrameImages::Pyramids images{left->pyramid, {}};
         if (right != nullptr) images.right = right->pyramid;
         frame.images = std::make_shared<FrameImages>(std::move(images));
       },
-      py::arg("frame"), py::arg("left"), py::arg("right").none(true) = py::none(),
-      "Keep the image pyramids of a new frame, so that patches can be aligned in them.");
+      py::arg("frame"), py::arg("image"), py::arg("is_rgb"),
+      py::arg("grey").none(true) = py::none(), py::arg("left").none(true) = py::none(),
+      py::arg("right").none(true) = py::none(), py::arg("rectifier").none(true) = py::none(),
+      "Keep of the image of a new frame what later steps need.\n\n"
+      "Its colours at the keypoints, of an image (h, w, 3) or (h, w, 4) uint8; with the rectifier\n"
+      "of a raw pair it is the raw left one. Where given, the grey image (h, w) uint8, shrunk to\n"
+      "some 1500 pixels, for align_rotation(), and the image pyramids of `left` and `right`, in\n"
+      "which patches are aligned. Raises ImageError for images of another size or kind.");
   module.def(
       "release_images",
       [](const Frame& frame) {
@@ -456,18 +473,6 @@ void bind_frame(py::module_& module) {
       py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
       "Align the right image of a new stereo frame, which keeps its images, to the left one at\n"
       "every keypoint with a depth. Returns how many were aligned.");
-  module.def(
-      "keep_small_image",
-      [](Frame& frame, const py::array& grey) {
-        if (!holds<std::uint8_t>(grey)) throw ImageError("image must be uint8");
-        const py::array pixels = normal_form(grey);
-        const cv::Mat source = view_image(pixels, CV_8U);
-        const py::gil_scoped_release release;
-        frame.small_image = shrink_image(source);
-      },
-      py::arg("frame"), py::arg("grey"),
-      "Keeps a new frame's image (h, w) uint8, shrunk to some 1500 pixels, for align_rotation().\n"
-      "Raises ImageError for anything but a grey image.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

@@ -2,10 +2,14 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <tuple>
+
+#include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 #include "frame/inlier_spread.hpp"
 #include "frame/match_error.hpp"
 #include "frame/rotation_alignment.hpp"
+#include "frame/velocity.hpp"
 
 namespace orbslam::bindings {
 namespace py = pybind11;
@@ -31,23 +35,26 @@ void bind_rotation(py::module_& module) {
 }
 
 void bind_inliers(py::module_& module) {
-  py::class_<InlierSpread>(module, "InlierSpread", "Result of spread_of_inliers().")
-      .def_readonly("cells", &InlierSpread::cells, "Of 48 cells of the image that hold an inlier.")
-      .def_readonly("octaves", &InlierSpread::octaves, "Of depth that hold an inlier.")
-      .def_readonly(
-          "covariance", &InlierSpread::covariance,
-          "(6, 6) cluster-robust covariance of the pose: rotation [rad], translation [m].\n"
-          "Zero where it is not determined.");
-  module.def("spread_of_inliers", &spread_of_inliers, py::arg("frame"),
-             py::call_guard<py::gil_scoped_release>(),
-             "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"
-             "Raises StateError without a pose.");
+  // A tuple: tracking reads all of it in each image.
   module.def(
-      "median_match_error", &median_match_error, py::arg("frame"),
-      py::call_guard<py::gil_scoped_release>(),
-      "Median distance between a frame's matched keypoints, outliers too, and the projections\n"
-      "of their points, in standard deviations of the keypoints' levels; 0 without any.\n"
-      "Raises StateError without a pose.");
+      "pose_evidence",
+      [](const TrackedFrame& frame) {
+        InlierSpread spread;
+        double match_error = 0;
+        {
+          const py::gil_scoped_release release;
+          spread = spread_of_inliers(frame);
+          match_error = median_match_error(frame);
+        }
+        return std::make_tuple(spread.cells, spread.octaves, match_error, spread.covariance);
+      },
+      py::arg("frame"),
+      "What a frame's matches say of its pose: (cells, octaves, match error, covariance).\n\n"
+      "How many of 48 cells of the image hold an inlier, and how many octaves of depth. The\n"
+      "median distance between matched keypoints, outliers too, and the projections of their\n"
+      "points, in standard deviations of the keypoints' levels; 0 without any. The (6, 6)\n"
+      "cluster-robust covariance of the pose, rotation [rad] and translation; zero where it is\n"
+      "not determined. Raises StateError without a pose.");
   module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
              py::call_guard<py::gil_scoped_release>(),
              "How many inliers of a frame a camera at `T_nw` would still have in its image.");
@@ -57,11 +64,69 @@ void bind_inliers(py::module_& module) {
              "camera at `T_nw`; 0 without any. Raises StateError without a pose.");
 }
 
+void bind_velocity(py::module_& module) {
+  py::class_<Velocity>(module, "Velocity",
+                       "A velocity, constant in the axes of the camera: the motion over an "
+                       "interval.")
+      .def(py::init([](const Pose& step, double seconds) {
+             return Velocity{step, seconds};
+           }),
+           py::arg("step"), py::arg("seconds"))
+      .def_readonly("step", &Velocity::step, "Motion over the interval, `T_cl`.")
+      .def_readonly("seconds", &Velocity::seconds,
+                    "The interval; negative where frames are tracked backwards in time.")
+      .def("over", &Velocity::over, py::arg("seconds"),
+           "The motion over another interval [s]; over more than a second, that over a second.")
+      .def("scaled", &Velocity::scaled, py::arg("factor"),
+           "The velocity after lengths have been multiplied by a factor.");
+  module.def("velocity_between", &velocity_between, py::arg("last"), py::arg("frame"),
+             py::arg("consecutive") = false,
+             "The Velocity between two frames; None without a pose of either. With `consecutive`\n"
+             "None unless the second is the next image and no loop has been closed between them.");
+  module.def(
+      "predict_pose", &predict_pose, py::arg("frame"), py::arg("last"),
+      py::arg("velocity").none(true) = py::none(),
+      "Set the pose of a frame by constant velocity; without one, to that of the last frame.\n"
+      "Raises StateError when the last frame has no pose.");
+}
+
+void bind_innovation(py::module_& module) {
+  module.def(
+      "change_from_prediction",
+      [](const TrackedFrame& frame, const TrackedFrame& last, const Velocity* velocity) {
+        const PoseChange change = change_from_prediction(frame, last, velocity);
+        return std::make_tuple(change.turn, change.move);
+      },
+      py::arg("frame"), py::arg("last"), py::arg("velocity").none(true) = py::none(),
+      "(angle [rad], distance of the centres) between the pose of a frame and the predicted one;\n"
+      "zero without a pose of either frame, or without a velocity.");
+  module.def(
+      "stated_covariance",
+      [](const Matrix6d& covariance, double factor, const TrackedFrame& frame,
+         const TrackedFrame& last, const Velocity* velocity, const Pose* map_motion,
+         double wrong_share) {
+        return stated_covariance(covariance, factor, frame, last,
+                                 {velocity, map_motion, wrong_share});
+      },
+      py::arg("covariance"), py::arg("factor"), py::arg("frame"), py::arg("last"),
+      py::arg("velocity").none(true) = py::none(), py::arg("map_motion").none(true) = py::none(),
+      py::arg("wrong_share") = 0.0,
+      "`factor` times a covariance (6, 6), plus that of the motion of the map under the last "
+      "frame\n"
+      "since it was tracked, and `wrong_share` times that of the innovation.");
+  module.def("count_staying_after", &count_staying_after, py::arg("frame"), py::arg("velocity"),
+             py::arg("n_intervals"), py::call_guard<py::gil_scoped_release>(),
+             "How many inliers of a frame are still in its image after so many intervals of a\n"
+             "velocity. Raises StateError without a pose.");
+}
+
 }  // namespace
 
 void bind_frame_evidence(py::module_& module) {
   bind_rotation(module);
   bind_inliers(module);
+  bind_velocity(module);
+  bind_innovation(module);
 }
 
 }  // namespace orbslam::bindings

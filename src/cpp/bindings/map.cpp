@@ -216,6 +216,14 @@ void bind_parts(MapClass& map) {
            "The first keyframe of a map, -1 without keyframes; it never dies.")
       .def("n_keyframes_of", reader(&Map::n_keyframes_of), "map"_a, Release(),
            "Number of published keyframes of a map.")
+      .def_property_readonly(
+          "n_active_keyframes",
+          [](const Map& self) {
+            const py::gil_scoped_release release;
+            const auto lock = self.read_lock();
+            return self.n_keyframes_of(self.active_map());
+          },
+          "Number of published keyframes of the active map.")
       .def(
           "n_points_of",
           [](const Map& self, MapIndex which) {
@@ -370,12 +378,13 @@ void bind_local_map(py::module_& module) {
           const py::gil_scoped_release release;
           followed = follow_map(map, frame);
         }
-        return py::make_tuple(std::move(followed.points), followed.stretched);
+        return py::make_tuple(std::move(followed.points), followed.stretched, followed.moved);
       },
       "map"_a, "frame"_a,
       "Bring an earlier frame up to date: its pose follows its keyframe, replaced points their\n"
       "successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much\n"
-      "lengths around the frame have been multiplied since).");
+      "lengths around the frame have been multiplied since, motion of its pose `T_after @\n"
+      "T_before^-1`). The motion is None without a pose, and where a loop has moved the map.");
   module.def(
       "transform_map",
       [](Map& map, MapIndex which, double scale, const Pose& pose) {

@@ -4,6 +4,7 @@
 #include "base/stop_flag.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "map/local_map.hpp"
 #include "matching/by_projection.hpp"
 #include "matching/by_words.hpp"
 #include "matching/for_initialization.hpp"
@@ -92,6 +93,20 @@ void bind_by_projection(py::module_& module) {
       "Search the local map's points that the frame does not hold yet.\n\n"
       "`exclude`: (n,) int64 ids of points thrown out as outliers earlier in this frame.\n"
       "Earlier points have priority. Returns LocalMapMatches. Raises StateError without a pose.");
+
+  module.def(
+      "match_local_map",
+      [](TrackedFrame& frame, const LocalMap& local_map, const IdArray& exclude,
+         float radius_factor) {
+        const auto excluded = to_point_ids(exclude);
+        const std::size_t n_held = frame.n_associated();
+        const LocalMapMatches matches = released(
+            [&] { return match_local_map(frame, local_map.points, excluded, radius_factor); });
+        return py::make_tuple(to_array(matches.visible), n_held + matches.visible.size());
+      },
+      "frame"_a, "local_map"_a, "exclude"_a, "radius_factor"_a,
+      "The same with a LocalMap. Returns (points in view that were not associated before, (n,)\n"
+      "int64; how many points should be in view, with those that were).");
 
   module.def(
       "match_keyframe_by_projection",

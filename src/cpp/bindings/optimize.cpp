@@ -5,6 +5,9 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
@@ -60,6 +63,22 @@ void bind_frame_sightings(py::module_& module) {
       .def("keep", &FrameSightings::keep, "frame"_a, Release(),
            "Keep the inliers of a frame, in place of what was kept of it before.")
       .def("forget", &FrameSightings::forget, "frame"_a, "Drop what a frame (its id) saw.")
+      .def(
+          "record",
+          [](FrameSightings& sightings, const Map& map, TrajectoryRecorder& recorder,
+             const TrackedFrame& frame, bool lost, bool keep, std::size_t n_youngest) {
+            recorder.record(map, frame, lost);
+            if (keep && !lost) {
+              sightings.keep(frame);
+              sightings.settle(map, recorder, n_youngest);
+            } else {
+              sightings.forget(frame.frame->id);
+            }
+            return frame.anchor.map;
+          },
+          "map"_a, "recorder"_a, "frame"_a, "lost"_a, "keep"_a, "n_youngest"_a, Release(),
+          "Record a frame, keep what it saw (`keep`, and not lost), and settle all but the\n"
+          "youngest frames. Returns the map of the frame.")
       .def("clear", &FrameSightings::clear, "Drop everything.")
       .def("settle", &FrameSightings::settle, "map"_a, "recorder"_a, "n_youngest"_a = 0, Release(),
            "Estimate the recorded poses of all but the youngest frames anew from the points as\n"
@@ -100,6 +119,22 @@ void bind_pose_optimization(py::module_& module) {
       "outliers are judged anew after each. Fewer than 3 associations: pose unchanged, no\n"
       "inliers. With a prior (PosePrior) any number is enough, and the covariance is that of both\n"
       "together. Raises StateError when the frame has no pose.");
+  module.def(
+      "estimate_pose",
+      [](TrackedFrame& frame) {
+        PoseEstimate estimate;
+        std::vector<MapPointId> discarded;
+        {
+          const py::gil_scoped_release release;
+          estimate = optimize_pose(frame);
+          discarded = frame.discard_outliers();
+        }
+        return std::make_tuple(estimate.n_inliers, estimate.covariance, to_array(discarded));
+      },
+      "frame"_a,
+      "optimize_pose(), then drop the outliers: (inliers, covariance (6, 6), ids (k,) int64 of "
+      "the\n"
+      "points that were dropped, ascending). Raises StateError without a pose.");
   module.def(
       "pose_covariance", &pose_covariance, "frame"_a, py::call_guard<py::gil_scoped_release>(),
       "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"

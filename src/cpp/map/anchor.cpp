@@ -28,7 +28,12 @@ double move_with_anchor(const Map& map, TrackedFrame& frame) {
 FollowedMap follow_map(const Map& map, TrackedFrame& frame) {
   FollowedMap followed;
   const auto lock = map.read_lock();
+  const std::optional<Pose> before = frame.T_cw;
+  const std::uint64_t big_change = frame.anchor.big_change;
   followed.stretched = move_with_anchor(map, frame);
+  if (before && frame.anchor.big_change == big_change) {
+    followed.moved = *frame.T_cw * before->inverse();
+  }
   refresh_associations(map, frame);
   for (const MapPointId id : frame.map_points) {
     if (const MapPoint* point = map.find(id)) followed.points.push_back(*point);

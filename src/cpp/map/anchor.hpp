@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "frame/frame.hpp"
 #include "map/map.hpp"
 #include "map/point_batch.hpp"
@@ -27,6 +29,9 @@ double move_with_anchor(const Map& map, TrackedFrame& frame);
 struct FollowedMap {
   PointBatch points;     ///< the points associated with the frame, in the order of its keypoints
   double stretched = 1;  ///< lengths around the frame have been multiplied by it
+  /// The motion of the frame's pose, T_after T_before^-1; nothing without a pose, or where a loop
+  /// has moved the map, which corrects an error of long before.
+  std::optional<Pose> moved;
 };
 
 /// Brings an earlier frame up to date, in one consistent view of the map: its pose follows its

@@ -76,4 +76,12 @@ AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t mos
   return counts;
 }
 
+PoseEstimate optimize_aligned(const Map& map, TrackedFrame& frame, std::size_t most, double noise,
+                              int fewest) {
+  PoseEstimate estimate = optimize_pose(frame);
+  if (most == 0 || estimate.n_inliers < fewest) return estimate;
+  align_frame(map, frame, most, noise);
+  return optimize_pose(frame);
+}
+
 }  // namespace orbslam

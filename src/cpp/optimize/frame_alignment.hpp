@@ -3,6 +3,7 @@
 
 #include "frame/frame.hpp"
 #include "map/map.hpp"
+#include "optimize/pose_optimization.hpp"
 #include "optimize/sighting_alignment.hpp"
 
 namespace orbslam {
@@ -14,5 +15,10 @@ namespace orbslam {
 /// docs/method/alignment.md#tracked-frames.
 AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most,
                             double noise = 0);
+
+/// optimize_pose(), and once more with aligned inliers (align_frame) where `most` is not 0 and the
+/// pose has at least `fewest` inliers.
+PoseEstimate optimize_aligned(const Map& map, TrackedFrame& frame, std::size_t most, double noise,
+                              int fewest);
 
 }  // namespace orbslam

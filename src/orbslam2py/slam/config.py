@@ -24,7 +24,7 @@ from orbslam2py.slam.inertial_config import InertialConfig
 USUAL_FEATURES, LEAST_SHARE = 1000, 0.6
 _INLIERS = (
     *("tracking.local_map_inliers", "tracking.scarce_inliers"),
-    *("relocalization.enough", "relocalization.enough_near", "relocalization.narrow"),
+    *("relocalization.enough", "relocalization.narrow"),
 )
 
 
@@ -151,22 +151,9 @@ class AcceptanceConfig:
     sudden_share: float = 0.6
     """Other hypotheses are searched below this share of the mean inliers, or of the mean
     visibility ratio."""
-    sudden_deviation: float = 2.5
-    """Other hypotheses are searched when the position's deviation is this factor above its
-    mean."""
-    surprise_windows: float = 1.0
-    """Other hypotheses are searched when the rotation differs from the prediction by this
-    number of search windows."""
     weak_share: float = 0.5
     """A pose is uncertain below this share of the mean inliers and of the mean visibility
     ratio."""
-    weak_cells: int = 4
-    """A pose is uncertain when its inliers lie in this number of the 48 cells of the image
-    or fewer."""
-    weak_deviation: float = 4.0
-    """A pose is uncertain when the position's deviation is this factor above its mean."""
-    weak_error: float = 1.5
-    """A pose is uncertain when the median reprojection error is this factor above its mean."""
     refused_share: float = 0.3
     """A pose is rejected below this share of the mean inliers, unless a second method
     confirms it."""
@@ -212,11 +199,9 @@ class KeyframeConfig:
     excluded, pixels."""
     inliers: int = 15
     """A keyframe needs more inliers than this (ORB-SLAM)."""
-    spacing: int = 1
-    """Fewest frames from one keyframe to the next with a single camera."""
     spacing_with_depth: int = 2
-    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is
-    not weak."""
+    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is not
+    weak; with a single camera it is one."""
 
 
 @dataclass(frozen=True)
@@ -234,11 +219,9 @@ class RelocalizationConfig:
     """Fewest inliers of a pose that is refined with further matches (ORB-SLAM)."""
     enough: int = 50
     """Inliers of a successful relocalization (ORB-SLAM)."""
-    enough_near: int = 30
-    """The same at the pose where tracking was just lost, or where the motion led."""
     narrow: int = 30
-    """With more inliers than this, but too few, a narrow window is searched as well
-    (ORB-SLAM)."""
+    """With more inliers than this, but too few, a narrow window is searched as well (ORB-SLAM). At
+    the pose where tracking was just lost, or where the motion led, so many are enough."""
     wide_window: float = 10.0
     """Search radius of the first refinement, pixels at level 0 (ORB-SLAM)."""
     wide_distance: int = 100
@@ -310,9 +293,8 @@ class TrajectoryConfig:
     """How the poses of past frames are refined."""
 
     rematch_every_frame: bool = False
-    """Match every frame with the map once more when that has settled, not only uncertain ones."""
-    rematch_uncertain: bool = True
-    """Match uncertain frames with the map once more when that has settled."""
+    """Match every frame with the map once more when that has settled, not only the first ones of a
+    single camera's map."""
 
 
 @dataclass(frozen=True)
@@ -332,9 +314,6 @@ class AlignmentConfig:
     tracked_inliers: int = 100
     """Most inliers of a tracked frame that are aligned before its last pose optimization;
     0: none."""
-    noise: float = 0.0
-    """Standard deviation of an aligned sighting over that of a corner; 0: as patches and
-    residuals say."""
     follow: bool = False
     """Where this sensor is aligned, track frames between two keyframes by patches alone and find
     features only where patches are not enough. One camera or RGB-D, without an IMU."""

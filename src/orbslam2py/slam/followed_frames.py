@@ -27,18 +27,13 @@ class FollowedFrames:
         The map.
     front_end : FrontEnd
         Builds the frames.
-    noise : float
-        Standard deviation of an aligned sighting over that of a corner; 0: as measured.
     fewest_keyframes : int
         In smaller maps frames need features.
     """
 
-    def __init__(
-        self, slam_map: core.Map, front_end: FrontEnd, noise: float, fewest_keyframes: int
-    ) -> None:
+    def __init__(self, slam_map: core.Map, front_end: FrontEnd, fewest_keyframes: int) -> None:
         self._map = slam_map
         self._front_end = front_end
-        self._noise = noise
         self._fewest_keyframes = fewest_keyframes
         self._earlier: core.TrackedFrame | None = None
 
@@ -94,7 +89,7 @@ class FollowedFrames:
             return None
         points, features = found
         frame = core.TrackedFrame(features)
-        core.associate_followed(self._map, frame, points, self._noise)
+        core.associate_followed(self._map, frame, points)
         frame.share_anchor(last)
         optimized = core.optimize_pose(frame)
         if optimized.n_inliers < _FOUND * points.n_in_view:

@@ -18,7 +18,7 @@ from orbslam2py.trajectory.trajectory import Trajectory
 #: So many frames wait for the end, when the map has settled, to be estimated or matched again;
 #: those before them are where the map was settled long ago.
 _MOST_WAITING = 1000
-#: So many frames in doubt wait for the end with all their keypoints, and so many of young maps.
+#: So many frames of young maps wait for the end with all their keypoints.
 _MOST_WITH_KEYPOINTS = 100
 
 _NO_POSES = Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
@@ -35,9 +35,9 @@ class FrameRecorder:
 
     The pose of a frame is stored relative to its reference keyframe, so it moves with the map. At
     the end, or after many further frames, it is estimated again from its points, because each of
-    them has moved separately. A frame that was uncertain, or that is among the first of a single
-    camera's map, is also matched with the map again (``docs/method/map.md``, settled frames). The
-    methods may be called from any thread, also while a frame is recorded.
+    them has moved separately. The first frames of a single camera's map are also matched with the
+    map again (``docs/method/map.md``, settled frames). The methods may be called from any thread,
+    also while a frame is recorded.
 
     Parameters
     ----------
@@ -46,9 +46,7 @@ class FrameRecorder:
     reestimation : FrameReestimation
         Matches frames with the map again, after many further frames.
     every_frame : bool
-        `reestimation` gets every frame, not only uncertain ones.
-    uncertain_frames : bool
-        `reestimation` gets frames whose pose was uncertain.
+        `reestimation` gets every frame, not only the first ones of a map.
     """
 
     def __init__(
@@ -57,7 +55,6 @@ class FrameRecorder:
         reestimation: FrameReestimation,
         *,
         every_frame: bool = False,
-        uncertain_frames: bool = True,
     ) -> None:
         self._map = slam_map
         self._second_look = reestimation
@@ -71,9 +68,8 @@ class FrameRecorder:
         self._young: list[_YoungFrame] | None = None
         self._young_map = -1
         self._every_frame = every_frame
-        self._uncertain_frames = uncertain_frames
-        # Frames to be matched again, by id, and whether they were in doubt.
-        self._with_keypoints: dict[int, tuple[core.TrackedFrame, bool]] = {}
+        # Frames to be matched again, by id.
+        self._with_keypoints: dict[int, core.TrackedFrame] = {}
         # The youngest map that a frame was recorded in.
         self._last_map = 0
 
@@ -103,25 +99,24 @@ class FrameRecorder:
                 again = self._second_look(frame, finished=False)
                 self._write(again, lost=lost, fixed_map=fixed_map)
                 if not (lost or fixed_map or frame.id in self._with_keypoints):
-                    self._keep_keypoints(again, in_doubt=False)
+                    self._keep_keypoints(again)
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         """Record a frame that is later than all others."""
         self._write(frame, lost=lost, fixed_map=fixed_map)
-        if not lost and frame.map_index != self._young_map:
-            self._young = None
-        if self._young is not None:
+        if self._young is None:
+            return
+        if lost or frame.map_index == self._young_map:
             self._young.append(_YoungFrame(frame, lost, fixed_map))
+        else:
+            self._young = None
 
     def _write(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         """Record a frame in place of its earlier record."""
-        self._recorder.record(self._map, frame, lost=lost)
-        if lost or fixed_map:
-            self._sightings.forget(frame.id)
-        else:
-            self._sightings.keep(frame)
-            self._sightings.settle(self._map, self._recorder, _MOST_WAITING)
-        self._last_map = max(self._last_map, frame.map_index)
+        recorded_in = self._sightings.record(
+            self._map, self._recorder, frame, lost, not fixed_map, _MOST_WAITING
+        )
+        self._last_map = max(self._last_map, recorded_in)
 
     def doubt(self, frame: core.TrackedFrame) -> None:
         """Withdraw the pose of the frame that is recorded next, if the frame after it is lost."""
@@ -133,7 +128,6 @@ class FrameRecorder:
         *,
         lost: bool,
         fixed_map: bool = False,
-        in_doubt: bool = False,
     ) -> None:
         """Record a frame; a lost one has no pose.
 
@@ -145,36 +139,26 @@ class FrameRecorder:
             Whether it has no pose.
         fixed_map : bool
             The map is fixed, so the pose need not follow it.
-        in_doubt : bool
-            Its pose is uncertain or needed a search of other hypotheses: the finished map may
-            improve it.
         """
         with self._lock:
             self._record_waiting(believed=not lost)
             if frame is self._doubted:
                 # A copy: the frame itself goes on following the map while others may read.
-                self._waiting = core.TrackedFrame(frame.features)
-                self._waiting.T_cw = frame.T_cw
-                self._waiting.share_anchor(frame)
+                self._waiting = frame.pose_alone()
             else:
                 self._append(frame, lost=lost, fixed_map=fixed_map)
             self._doubted = None
-            again = self._every_frame or (in_doubt and self._uncertain_frames)
-            if again and not lost and not fixed_map:
-                self._keep_keypoints(frame, in_doubt=in_doubt)
+            if self._every_frame and not lost and not fixed_map:
+                self._keep_keypoints(frame)
 
-    def _keep_keypoints(self, frame: core.TrackedFrame, *, in_doubt: bool) -> None:
-        """Queue a frame to be matched again later; a full queue handles its oldest frame now."""
+    def _keep_keypoints(self, frame: core.TrackedFrame) -> None:
+        """Queue a frame to be matched again later; of a full queue the oldest frame leaves."""
         waiting = self._with_keypoints
-        waiting[frame.id] = (frame, in_doubt)
-        if self._every_frame:
-            if len(waiting) > _MOST_WAITING:
-                oldest, was_in_doubt = waiting.pop(min(waiting))
-                self._write(self._second_look(oldest, in_doubt=was_in_doubt), lost=False)
-            return
-        alike = [number for number, (_, doubted) in waiting.items() if doubted == in_doubt]
-        if len(alike) > _MOST_WITH_KEYPOINTS:
-            del waiting[min(alike)]
+        waiting[frame.id] = frame
+        if len(waiting) > (_MOST_WAITING if self._every_frame else _MOST_WITH_KEYPOINTS):
+            oldest = waiting.pop(min(waiting))
+            if self._every_frame:
+                self._write(self._second_look(oldest), lost=False)
 
     def _record_waiting(self, *, believed: bool = True) -> None:
         """Record the frame that waits for the next one; called when its pose is needed earlier."""
@@ -195,11 +179,11 @@ class FrameRecorder:
         """Match waiting frames again, of all maps or of one; estimate the others again."""
         self._record_waiting()
         waiting, self._with_keypoints = self._with_keypoints, {}
-        for frame, in_doubt in waiting.values():
+        for frame in waiting.values():
             if only_map is None or self._map_of(frame) == only_map:
-                self._write(self._second_look(frame, in_doubt=in_doubt), lost=False)
+                self._write(self._second_look(frame), lost=False)
             else:
-                self._with_keypoints[frame.id] = (frame, in_doubt)
+                self._with_keypoints[frame.id] = frame
         self._sightings.settle(self._map, self._recorder)
 
     def _map_of(self, frame: core.TrackedFrame) -> int:

@@ -253,7 +253,8 @@ class FrontEnd:
             shape = getattr(depth, "shape", None)
             raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
         # Where a masked array hides the depth there is none; nor may a matrix's own rules count.
-        depth = np.asarray(np.ma.filled(depth, 0))
+        if type(depth) is not np.ndarray:
+            depth = np.asarray(np.ma.filled(depth, 0))
         if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
         depth = self._enlarged(depth, image)
@@ -289,11 +290,9 @@ class FrontEnd:
         *,
         rectifier: core.PairRectifier | None = None,
     ) -> core.Frame:
-        if self._keep_images:
-            core.keep_images(frame, left, right)
-        core.keep_small_image(frame, grey)
-        if image.ndim == 3:
-            core.sample_colours(frame, image, self._settings.camera.rgb, rectifier)
+        kept = left if self._keep_images else None
+        is_rgb = self._settings.camera.rgb
+        core.keep_pixels(frame, image, is_rgb, grey, kept, right, rectifier)
         return frame
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
@@ -362,7 +361,7 @@ def check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> No
 
 def _refuse_masked(array: npt.NDArray[np.uint8], what: str) -> None:
     # What lies below its mask would be tracked: there is no grey value for "nothing".
-    if isinstance(array, np.ma.MaskedArray):
+    if type(array) is not np.ndarray and isinstance(array, np.ma.MaskedArray):
         raise ImageError(
             f"{what} is a masked array; give its data, and where to look as mask=, uint8 with 0 "
             "where no keypoint may lie"

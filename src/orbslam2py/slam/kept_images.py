@@ -45,8 +45,6 @@ class KeptImages:
         waiting : bool
             No map has begun, or the frame may become a keyframe later.
         """
-        if not frame.has_images:
-            return
         if is_keyframe:
             self._keyframes.append(frame)
             if len(self._keyframes) > _KEYFRAMES:

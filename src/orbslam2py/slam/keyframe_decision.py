@@ -11,7 +11,7 @@ from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import KeyframeConfig
-from orbslam2py.slam.state import SinceKeyframe, Velocity
+from orbslam2py.slam.state import SinceKeyframe
 
 _TURN_FRAMES = 3  # frames that the view is predicted ahead: a keyframe needs as long to be mapped
 _QUEUE = 3  # keyframes that may wait for the mapper, with depth (ORB-SLAM2)
@@ -52,19 +52,15 @@ class KeyframeDecision:
         self._max_keyframe_interval = max_keyframe_interval
         self.limits = config
         #: Fewest frames from one keyframe to the next.
-        self.spacing = config.spacing_with_depth if sensor.has_depth else config.spacing
+        self.spacing = config.spacing_with_depth if sensor.has_depth else 1
         self._waits = waits
-
-    def due(self, frame_id: int, since: SinceKeyframe) -> bool:
-        """Return whether a frame may become a keyframe at all."""
-        return frame_id >= since.frame_id + self.spacing
 
     def wanted(
         self,
         frame: core.TrackedFrame,
         reference_keyframe: int,
         n_inliers: int,
-        velocity: Velocity | None,
+        velocity: core.Velocity | None,
         since: SinceKeyframe,
     ) -> bool:
         """Return whether a tracked frame becomes a keyframe now.
@@ -85,7 +81,7 @@ class KeyframeDecision:
         if self._mapping.pausing:
             return False
         limits = self.limits
-        n_keyframes = self._map.n_keyframes_of(self._map.active_map)
+        n_keyframes = self._map.n_active_keyframes
         n_reference = self._points_of(reference_keyframe, n_keyframes)
         loses_what_it_saw = n_inliers < limits.kept_share * since.most_inliers
         needs_new_points = self._has_depth and (
@@ -93,7 +89,8 @@ class KeyframeDecision:
             or self._lacks_close_points(frame)
             or self._turns_away(frame, n_inliers, velocity)
         )
-        one_second_passed = frame.id >= since.frame_id + self._max_keyframe_interval
+        n_frames = frame.id - since.frame_id
+        one_second_passed = n_frames >= self._max_keyframe_interval
         tracking_is_weak = self._has_depth and (
             n_inliers < limits.weak_share * n_reference or needs_new_points
         )
@@ -103,7 +100,7 @@ class KeyframeDecision:
             or self._hangs_on_few(frame, n_inliers, since)
         )
         worth_it = sees_new_things and n_inliers > limits.inliers
-        due = self.due(frame.id, since)
+        due = n_frames >= self.spacing
         if worth_it and due and self._waits:
             # Frames alone count, not how fast the mapper is.
             self._mapping.wait_until_idle(unless_held=True)
@@ -148,14 +145,12 @@ class KeyframeDecision:
         return tracked < limits.few_close_points and untracked > limits.many_untracked_close_points
 
     def _turns_away(
-        self, frame: core.TrackedFrame, n_inliers: int, velocity: Velocity | None
+        self, frame: core.TrackedFrame, n_inliers: int, velocity: core.Velocity | None
     ) -> bool:
         """Return whether the tracked points will leave the view soon and others can follow."""
-        T_nw = frame.T_cw
-        if velocity is None or T_nw is None:
+        if velocity is None:
             return False
-        T_nw = velocity.over(_TURN_FRAMES * velocity.seconds) @ T_nw
-        staying = core.count_staying(frame, T_nw)
+        staying = core.count_staying_after(frame, velocity, _TURN_FRAMES)
         if staying >= self.limits.kept_share * n_inliers:
             return False
         _, untracked = frame.n_close_tracked_untracked()

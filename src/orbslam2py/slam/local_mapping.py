@@ -124,7 +124,6 @@ class LocalMapping:
             core.align_keyframes(
                 self._map,
                 keyframe,
-                alignment.noise,
                 patches_only=not alignment.new_keyframes,
                 n_threads=self._adjustment_threads,
             )
@@ -140,7 +139,7 @@ class LocalMapping:
                     self._monocular,
                     self._adjustment_threads,
                     inertial=self.inertial,
-                    measures_noise=self._alignment is not None and self._alignment.noise == 0,
+                    measures_noise=self._alignment is not None,
                 )
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(

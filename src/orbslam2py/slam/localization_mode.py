@@ -43,7 +43,7 @@ class LocalizationSwitch:
 
     @property
     def _n_keyframes(self) -> int:
-        return int(self._map.n_keyframes_of(self._map.active_map))
+        return int(self._map.n_active_keyframes)
 
     def apply(self) -> None:
         """Carry out the switch, between two frames."""

@@ -47,7 +47,6 @@ from orbslam2py.slam.records import (
     TrackingRecord,
     TrackingResult,
     TrackingState,
-    Verdict,
 )
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.rig_front_end import RigFrontEnd, front_end_of
@@ -125,7 +124,7 @@ class Pipeline:
             assert isinstance(self.front_end, FrontEnd)
             # A single camera's young map still changes its shape.
             fewest = 0 if sensor.has_depth else _SETTLED_MAP
-            self._followed = FollowedFrames(back_end.map, self.front_end, alignment.noise, fewest)
+            self._followed = FollowedFrames(back_end.map, self.front_end, fewest)
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(
             setup.imu, back_end.events.worker.offer if in_time else _at_once
@@ -137,7 +136,6 @@ class Pipeline:
             back_end.map,
             FrameReestimation(back_end.map, _make_search(setup, back_end, config)),
             every_frame=config.trajectory.rematch_every_frame,
-            uncertain_frames=config.trajectory.rematch_uncertain,
         )
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()
@@ -264,7 +262,8 @@ class Pipeline:
             self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
-        self.inertial.look(interval, record, frame.big_change)
+        if self.inertial.check is not None:
+            self.inertial.look(interval, record, frame.big_change)
         self._announce(state_before, record)
         self.back_end.mapping.start()
         for watch in watchers:
@@ -333,9 +332,9 @@ class Pipeline:
     def _look_again_at_start(self) -> None:
         """Estimate the first frames of a single camera's map again, once this map has settled."""
         n_young = self.recorder.n_young
-        slam_map = self.back_end.map
-        settled = slam_map.n_keyframes_of(slam_map.active_map) > _SETTLED_MAP
-        if n_young > 0 and (settled or n_young >= _YOUNG_FRAMES):
+        if n_young >= _YOUNG_FRAMES or (
+            n_young > 0 and self.back_end.map.n_active_keyframes > _SETTLED_MAP
+        ):
             self.recorder.reestimate_first_frames()
 
     def _take_samples(self, timestamp: float) -> ImuInterval | None:
@@ -353,15 +352,12 @@ class Pipeline:
                 _log.info("lost soon after initialization; starting a new map")
             self._given_up = outcome.given_up
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
-            evidence = outcome.estimate.evidence
             if outcome.earlier:
                 self.recorder.begin(outcome.earlier)
             self.recorder.record(
                 frame,
                 lost=outcome.state is TrackingState.LOST,
                 fixed_map=self.localization.on,
-                in_doubt=evidence is not None
-                and (evidence.doubted or evidence.verdict is Verdict.WEAK),
             )
 
     def _record(
@@ -374,13 +370,14 @@ class Pipeline:
     ) -> TrackingRecord:
         ok = outcome.state is TrackingState.OK
         estimate = outcome.estimate
+        T_cw = frame.T_cw if ok else None
         return TrackingRecord(
-            frame_id=frame.id,
-            timestamp=frame.timestamp,
+            frame_id=self._next_frame_id - 1,
+            timestamp=self._last_timestamp,
             map_index=frame.map_index if ok else self.back_end.map.active_map,
             state=outcome.state,
             reason=estimate.reason,
-            T_cw=frame.T_cw.matrix if ok and frame.T_cw is not None else None,
+            T_cw=T_cw.matrix if T_cw is not None else None,
             covariance=estimate.covariance if ok else None,
             n_matches=estimate.n_matches,
             n_inliers=estimate.n_inliers if ok else 0,

@@ -168,8 +168,8 @@ class RigFrontEnd(FrontEnd):
         else:
             frame = core.build_monocular_frame(context, frame_id, timestamp, extractions[i])
         image = pixels[i]
-        if image is not None and image.ndim == 3:
-            core.sample_colours(frame, image, self._settings.camera.rgb)
+        if image is not None:
+            core.keep_pixels(frame, image, self._settings.camera.rgb)
         return frame
 
     def _seeing(

@@ -408,8 +408,7 @@ class Tracking:
     @property
     def _is_small(self) -> bool:
         """Return whether the map is dropped if tracking is lost."""
-        active = self._map.active_map
-        n_keyframes = self._map.n_keyframes_of(active) - self._initializer.n_between(active)
+        n_keyframes = self._map.n_active_keyframes - self._initializer.n_between()
         return bool(n_keyframes <= self._search.limits.small_map)
 
     # ---- keyframes -------------------------------------------------------------------------------

@@ -65,12 +65,7 @@ class WatchedFrame:
 
         The copy remains valid after the call.
         """
-        if self._frame.T_cw is None:
-            return None
-        copy = core.TrackedFrame(self._frame.features)
-        copy.T_cw = self._frame.T_cw
-        copy.share_anchor(self._frame)
-        return copy
+        return None if self._frame.T_cw is None else self._frame.pose_alone()
 
     def pixels(self) -> npt.NDArray[np.float32]:
         """Pixels of the keypoints in the given image, (n, 2)."""

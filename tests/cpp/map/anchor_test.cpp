@@ -52,6 +52,19 @@ TEST_F(AnchoredFrame, FollowsItsKeyframeAndTheScale) {
   EXPECT_EQ(follow_map(builder.map, frame).stretched, 1.0);
 }
 
+TEST_F(AnchoredFrame, TellsHowItMovedUnlessALoopDidIt) {
+  const Pose before = *frame.T_cw;
+  const Pose adjusted = builder.map.T_cw(kf(1)) * kMove;
+  builder.map.set_pose(kf(1), adjusted);  // as local bundle adjustment does
+  const auto moved = follow_map(builder.map, frame).moved;
+  ASSERT_TRUE(moved);
+  EXPECT_TRUE((*moved * before).matrix().isApprox((kStep * adjusted).matrix(), 1e-12));
+  move_world(builder.map, 1.5);
+  EXPECT_FALSE(follow_map(builder.map, frame).moved);
+  frame.T_cw.reset();
+  EXPECT_FALSE(follow_map(builder.map, frame).moved);
+}
+
 TEST_F(AnchoredFrame, BecomesAKeyframeOfTheMapAsItIs) {
   move_world(builder.map, 1);
   const KeyFrameId id = insert_keyframe(builder.map, frame, false);

@@ -165,6 +165,28 @@ TEST(AlignFrame, NoInlierIsLost) {
   EXPECT_GE(optimize_pose(frame).n_inliers, before - 2);
 }
 
+TEST(OptimizeAligned, OptimizesAgainWhereThePoseHasEnoughInliers) {
+  Wall wall;
+  align_keyframes(wall.map, KeyFrameId(0), 0, true);
+  TrackedFrame by_hand = tracked(wall), aligned = tracked(wall), plain = tracked(wall);
+  const int n = optimize_pose(by_hand).n_inliers;
+  const Pose without = *by_hand.T_cw;
+  align_frame(wall.map, by_hand, 200);
+  const PoseEstimate expected = optimize_pose(by_hand);
+
+  const PoseEstimate estimate = optimize_aligned(wall.map, aligned, 200, 0, n);
+  EXPECT_EQ(estimate.n_inliers, expected.n_inliers);
+  EXPECT_EQ(estimate.covariance, expected.covariance);
+  EXPECT_EQ(aligned.T_cw->matrix(), by_hand.T_cw->matrix());
+  EXPECT_NE(aligned.T_cw->matrix(), without.matrix());
+
+  EXPECT_EQ(optimize_aligned(wall.map, plain, 200, 0, n + 1).n_inliers, n);
+  EXPECT_EQ(plain.T_cw->matrix(), without.matrix());
+  TrackedFrame none = tracked(wall);
+  optimize_aligned(wall.map, none, 0, 0, 0);
+  EXPECT_EQ(none.T_cw->matrix(), without.matrix());
+}
+
 TEST(AlignKeyframes, TheAssumedNoiseGivesTheWeights) {
   Wall wall;
   align_keyframes(wall.map, kNewest, 0.5);

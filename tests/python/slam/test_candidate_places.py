@@ -12,7 +12,7 @@ import pytest
 
 from orbslam2py import _core
 from orbslam2py.slam.relocalization import CandidatePlaces, candidates
-from orbslam2py.slam.state import MOTION_FRAMES, LastKnownPose, LostSearch, Velocity, loss
+from orbslam2py.slam.state import MOTION_FRAMES, LastKnownPose, LostSearch, loss
 
 FRAME: Any = SimpleNamespace()
 
@@ -54,8 +54,8 @@ class FakeCore:
     def find_relocalization_candidates(self, *_: object) -> list[SimpleNamespace]:
         return [SimpleNamespace(keyframe=k, group_score=s) for k, s in sorted(self.found.items())]
 
-    def follow_map(self, *_: object) -> tuple[str, float]:
-        return "points", self.stretched
+    def follow_map(self, *_: object) -> tuple[str, float, None]:
+        return "points", self.stretched, None
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ class Places:
         return keyframes
 
 
-SPEED = Velocity(_core.Pose([0, 0, 0, 1], [0.5, 0, 0]), 0.1)
+SPEED = _core.Velocity(_core.Pose([0, 0, 0, 1], [0.5, 0, 0]), 0.1)
 
 
 def frame_at(number: int, x: float = 0.0) -> Any:
@@ -90,7 +90,7 @@ def frame_at(number: int, x: float = 0.0) -> Any:
     return SimpleNamespace(id=number, timestamp=number / 10, T_cw=T_cw)
 
 
-def lost_at(keyframe: int, velocity: Velocity | None = None) -> LastKnownPose:
+def lost_at(keyframe: int, velocity: _core.Velocity | None = None) -> LastKnownPose:
     return LastKnownPose(frame_at(10, 5.0), velocity, keyframe)
 
 

@@ -25,7 +25,7 @@ def test_every_value_is_reached_by_its_name() -> None:
 
 def test_there_are_no_more_values_than_a_person_can_look_through() -> None:
     """Sizes of buffers, patience and limits inside a step are constants beside the code."""
-    assert len(list(all_values(Config()))) <= 108
+    assert len(list(all_values(Config()))) <= 100
 
 
 def test_every_value_says_what_it_means() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orbslam2py.slam.initialization import earlier_frames
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.records import PoseEstimate, Verdict
 from orbslam2py.slam.state import Motion
@@ -36,7 +37,7 @@ def estimate(degrees: float, verdict: Verdict = Verdict.STRONG) -> PoseEstimate:
 @pytest.fixture(autouse=True)
 def map_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Motion, "following", lambda motion, slam_map: motion)
-    monkeypatch.setattr(Motion, "since_last", lambda motion, frame: None)
+    monkeypatch.setattr(earlier_frames.core, "velocity_between", lambda last, frame: None)
 
 
 def tracked(judge: Callable[[int], PoseEstimate]) -> list[int]:

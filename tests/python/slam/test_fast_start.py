@@ -76,4 +76,4 @@ def test_of_few_features_fewer_inliers_are_asked_for(
     assert config.tracking.local_map_inliers == inliers
     assert config.tracking.map_matches == Config().tracking.map_matches
     again = config.relocalization
-    assert (again.narrow, again.enough_near, again.enough) == (inliers, inliers, after)
+    assert (again.narrow, again.enough) == (inliers, after)

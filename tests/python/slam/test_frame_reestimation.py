@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames that were in doubt, or came early, are matched with the finished map once more."""
+"""Frames that came early, or all of them, are matched with the finished map once more."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ class Walk:
         keyframes = {self.map.keyframe_frame(k).id for k in self.map.keyframe_ids()}
         return next(frame for frame in reversed(self.frames) if frame.id not in keyframes)
 
-    def put_aside(self, frame: core.TrackedFrame, every: int = 3) -> core.TrackedFrame:
-        """A version of the frame with a pose that is wrong, and every so many of its points."""
+    def put_aside(self, frame: core.TrackedFrame) -> core.TrackedFrame:
+        """A version of the frame with a pose that is wrong, and its points."""
         version = core.TrackedFrame(frame.features)
-        version.copy_associations(frame, np.arange(len(frame.features)) % every == 0)
+        version.copy_associations(frame, np.ones(len(frame.features), bool))
         assert frame.T_cw is not None
         version.T_cw = ASIDE @ frame.T_cw
         core.anchor_frame(self.map, version, frame.reference_keyframe)
@@ -75,42 +75,16 @@ def way(first: core.TrackedFrame, second: core.TrackedFrame) -> float:
     return float(np.linalg.norm((first.T_cw @ second.T_cw.inverse()).matrix[:3, 3]))
 
 
-def test_a_frame_in_doubt_is_found_where_it_was(walk: Walk) -> None:
+def test_a_frame_is_found_where_it_was(walk: Walk) -> None:
     frame = walk.no_keyframe()
     aside = walk.put_aside(frame)
     assert way(aside, frame) > 0.1
-    found = walk.reestimation(aside, in_doubt=True)
+    found = walk.reestimation(aside)
     assert way(found, frame) < 0.01
     assert way(aside, frame) > 0.1, "what was tracked stays as it is"
-    again = walk.reestimation(aside, in_doubt=True)
+    again = walk.reestimation(aside)
     assert again.T_cw is not None and found.T_cw is not None
     np.testing.assert_array_equal(again.T_cw.matrix, found.T_cw.matrix)
-
-
-@pytest.mark.parametrize("in_doubt", [False, True])
-def test_a_frame_that_holds_all_of_its_points_is_found_where_it_was(
-    walk: Walk, in_doubt: bool
-) -> None:
-    frame = walk.no_keyframe()
-    found = walk.reestimation(walk.put_aside(frame, every=1), in_doubt=in_doubt)
-    assert way(found, frame) < 0.01
-
-
-def test_a_look_that_does_not_show_clearly_more_is_not_followed(
-    walk: Walk, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It may have found other things, and led to where still other ones are found."""
-    began: list[core.TrackedFrame] = []
-
-    def remember(_: LocalMapSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
-        assert in_doubt
-        began.append(refined.frame)
-        return refined
-
-    monkeypatch.setattr(LocalMapSearch, "rematch", remember)
-    aside = walk.put_aside(walk.no_keyframe(), every=1)
-    assert way(walk.reestimation(aside, in_doubt=True), aside) < 1e-9
-    assert way(began[0], aside) < 1e-9
 
 
 def test_a_frame_that_sees_nothing_of_the_map_keeps_its_pose(walk: Walk) -> None:
@@ -120,59 +94,25 @@ def test_a_frame_that_sees_nothing_of_the_map_keeps_its_pose(walk: Walk) -> None
     behind = core.Pose(np.array([0.0, 1, 0, 0]), np.zeros(3))
     blind.T_cw = behind @ frame.T_cw
     core.anchor_frame(walk.map, blind, frame.reference_keyframe)
-    found = walk.reestimation(blind, in_doubt=True)
+    found = walk.reestimation(blind)
     assert way(found, blind) < 1e-9
 
 
 def test_a_keyframe_keeps_its_pose(walk: Walk) -> None:
     first = walk.frames[0]
-    assert way(walk.reestimation(first, in_doubt=True), first) < 1e-9
-
-
-def test_only_those_in_doubt_are_looked_at_and_only_at_the_end(walk: Walk) -> None:
-    moved = MovedByAMetre()
-    recorder = FrameRecorder(walk.map, moved)
-    for frame in walk.frames:
-        recorder.record(
-            frame,
-            lost=frame.id == 7,
-            fixed_map=frame.id == 8,
-            in_doubt=frame.id in (2, 7, 8, 9),
-        )
-    before = recorder.trajectory()
-    assert moved.seen == []
-    recorder.settle()
-    assert moved.seen == [(2, True), (9, True)]
-    after = recorder.trajectory()
-    ways = np.linalg.norm(after.positions - before.positions, axis=1)
-    assert ways[[2, 9]] == pytest.approx([1, 1])
-    assert np.delete(ways, [2, 9]).max() < 0.1
-    recorder.settle()
-    assert len(moved.seen) == 2, "once"
+    assert way(walk.reestimation(first), first) < 1e-9
 
 
 def test_a_pose_that_was_taken_back_is_not_looked_for(walk: Walk) -> None:
     moved = MovedByAMetre()
-    recorder = FrameRecorder(walk.map, moved)
+    recorder = FrameRecorder(walk.map, moved, every_frame=True)
     recorder.record(walk.frames[0], lost=False)
     recorder.doubt(walk.frames[1])
-    recorder.record(walk.frames[1], lost=False, in_doubt=True)
+    recorder.record(walk.frames[1], lost=False)
     recorder.record(walk.frames[2], lost=True)
     recorder.settle()
-    assert moved.seen == []
+    assert moved.seen == [0]
     assert list(recorder.trajectory().lost) == [False, True, True]
-
-
-def test_of_many_in_doubt_the_youngest_are_kept(
-    walk: Walk, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(frame_recorder, "_MOST_WITH_KEYPOINTS", 3)
-    moved = MovedByAMetre()
-    recorder = FrameRecorder(walk.map, moved)
-    for frame in walk.frames:
-        recorder.record(frame, lost=False, in_doubt=True)
-    recorder.settle()
-    assert [number for number, _ in moved.seen] == [N - 3, N - 2, N - 1]
 
 
 def test_every_frame_is_looked_at_where_that_is_asked_for(
@@ -182,15 +122,15 @@ def test_every_frame_is_looked_at_where_that_is_asked_for(
     moved = MovedByAMetre()
     recorder = FrameRecorder(walk.map, moved, every_frame=True)
     for frame in walk.frames:
-        recorder.record(frame, lost=frame.id == 5, in_doubt=frame.id == 6)
+        recorder.record(frame, lost=frame.id == 5, fixed_map=frame.id == 6)
     # Of too many the oldest does not wait for the end.
-    early = [(number, number == 6) for number in range(N) if number != 5][:-3]
-    assert moved.seen == early
+    every = [number for number in range(N) if number not in (5, 6)]
+    assert moved.seen == every[:-3]
     recorder.settle()
-    assert moved.seen == [*early, (N - 3, False), (N - 2, False), (N - 1, False)]
+    assert moved.seen == every
     assert list(recorder.trajectory().indices) == list(range(N))
     recorder.settle()
-    assert len(moved.seen) == N - 1, "once"
+    assert len(moved.seen) == N - 2, "once"
 
 
 @pytest.mark.parametrize("effort", list(Effort))
@@ -217,55 +157,33 @@ def test_thorough_looks_at_every_frame(effort: Effort, monkeypatch: pytest.Monke
 
 
 # ---- frames of young maps ------------------------------------------------------------------------
-def young(
-    walk: Walk, frames: list[core.TrackedFrame], in_doubt: tuple[int, ...] = ()
-) -> FrameRecorder:
+def young(walk: Walk, frames: list[core.TrackedFrame]) -> FrameRecorder:
     """A recorder whose map has begun with the first of these frames, and settled with the last."""
     moved = MovedByAMetre()
     recorder = FrameRecorder(walk.map, moved)
     recorder.begin(frames[:1])
     for frame in frames[1:]:
-        recorder.record(frame, lost=False, in_doubt=frame.id in in_doubt)
+        recorder.record(frame, lost=False)
     recorder.reestimate_first_frames()
     moved.seen.clear()
     return recorder
 
 
-def seen_at_the_end(recorder: FrameRecorder) -> list[tuple[int, bool]]:
+def seen_at_the_end(recorder: FrameRecorder) -> list[int]:
     recorder.settle()
     moved = recorder._second_look
     assert isinstance(moved, MovedByAMetre)
     return moved.seen
 
 
-def test_frames_of_a_young_map_are_looked_at_again_and_doubt_is_not_forgotten(walk: Walk) -> None:
-    recorder = young(walk, walk.frames[:5], in_doubt=(2,))
-    recorder.record(walk.frames[5], lost=False)
-    assert sorted(seen_at_the_end(recorder)) == [
-        (0, False),
-        (1, False),
-        (2, True),
-        (3, False),
-        (4, False),
-    ]
-
-
-def test_frames_of_a_young_map_do_not_push_out_those_in_doubt(
+def test_frames_of_a_young_map_are_looked_at_again_the_youngest_of_many(
     walk: Walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    recorder = young(walk, walk.frames[:5])
+    recorder.record(walk.frames[5], lost=False)
+    assert seen_at_the_end(recorder) == [0, 1, 2, 3, 4]
     monkeypatch.setattr(frame_recorder, "_MOST_WITH_KEYPOINTS", 3)
-    recorder = young(walk, walk.frames[:8], in_doubt=(1, 2))
-    recorder.record(walk.frames[8], lost=False, in_doubt=True)
-    recorder.record(walk.frames[9], lost=False, in_doubt=True)
-    # Of each kind the youngest: frame 1 was in doubt and is the oldest of four.
-    assert sorted(seen_at_the_end(recorder)) == [
-        (2, True),
-        (5, False),
-        (6, False),
-        (7, False),
-        (8, True),
-        (9, True),
-    ]
+    assert seen_at_the_end(young(walk, walk.frames[:8])) == [5, 6, 7]
 
 
 def test_frames_that_were_localised_while_a_map_was_young_stay(walk: Walk) -> None:
@@ -277,7 +195,7 @@ def test_frames_that_were_localised_while_a_map_was_young_stay(walk: Walk) -> No
     recorder.reestimate_first_frames()
     moved.seen.clear()
     recorder.settle()
-    assert moved.seen == [(0, False)]
+    assert moved.seen == [0]
 
 
 def test_looks_at_old_frames_leave_those_of_a_young_map_alone(
@@ -289,7 +207,7 @@ def test_looks_at_old_frames_leave_those_of_a_young_map_alone(
     recorder = FrameRecorder(walk.map, moved, every_frame=True)
     for frame in walk.frames[:4]:
         recorder.record(frame, lost=False)
-    assert moved.seen == [(0, False)]
+    assert moved.seen == [0]
     recorder.begin(walk.frames[4:5])
     for frame in walk.frames[5:8]:
         recorder.record(frame, lost=False)
@@ -303,15 +221,14 @@ def test_a_map_that_ends_is_finished_others_are_not(
     walk: Walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     moved = MovedByAMetre()
-    recorder = FrameRecorder(walk.map, moved)
-    for frame in walk.frames:
-        recorder.record(frame, lost=False, in_doubt=frame.id == 9)
+    recorder = FrameRecorder(walk.map, moved, every_frame=True)
+    recorder.record(walk.frames[9], lost=False)
     recorder.end_map(walk.map.active_map + 1)
     assert moved.seen == []
     recorder.end_map(walk.map.active_map)
-    assert moved.seen == [(9, True)]
+    assert moved.seen == [9]
     recorder.settle()
-    assert moved.seen == [(9, True)], "once"
+    assert moved.seen == [9], "once"
 
 
 def test_only_the_last_look_is_matched_from_nothing(
@@ -328,8 +245,7 @@ def test_only_the_last_look_is_matched_from_nothing(
     walk.reestimation(frame, finished=False)
     assert looked == []
     walk.reestimation(frame)
-    walk.reestimation(frame, in_doubt=True)
-    assert looked == [(frame.id, False), (frame.id, True)]
+    assert looked == [(frame.id, False)]
 
 
 def test_an_aligned_frame_without_images_is_left_alone(
@@ -350,5 +266,3 @@ def test_an_aligned_frame_without_images_is_left_alone(
     monkeypatch.setattr(type(frame), "aligned", Aligned())
     walk.reestimation(frame)
     assert looked == []
-    walk.reestimation(frame, in_doubt=True)
-    assert looked == [frame.id]

@@ -194,7 +194,7 @@ def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:
 def test_where_its_motion_led_fewer_inliers_are_enough(
     world: MappedWorld, frames_since: int, found: bool
 ) -> None:
-    limits = RelocalizationConfig(enough=10**6, enough_near=30)
+    limits = RelocalizationConfig(enough=10**6)
     last = world.system.pipeline.tracking.motion.last.id
     again = Search(world, limits)(described(world, last + frames_since))
     assert (again.n_inliers >= 30) == found

@@ -59,11 +59,10 @@ class Walk:
     def turned(self, radians: float, n_inliers: int, *, metres: float = 1e-3) -> RefinedPose:
         """A pose beside the right one that so many points fit, told with so many metres."""
         refined = self.refined()
-        version = core.TrackedFrame(self.last.features)
+        version = self.last.pose_alone()
         turn = core.Pose.exp([0, radians, 0, 0, 0, 0])
-        assert self.last.T_cw is not None
-        version.T_cw = turn @ self.last.T_cw
-        version.share_anchor(self.last)
+        assert version.T_cw is not None
+        version.T_cw = turn @ version.T_cw
         estimate = PoseEstimate(n_inliers=n_inliers, covariance=metres**2 / 3 * np.eye(6))
         return replace(refined, frame=version, estimate=estimate)
 
@@ -95,18 +94,20 @@ def walk() -> Iterator[Walk]:
 def test_the_spread_of_inliers_is_that_of_one_frame_with_and_without_its_outliers(
     walk: Walk,
 ) -> None:
-    def figures(spread: core.InlierSpread) -> tuple[float, ...]:
-        return spread.cells, spread.octaves, *spread.covariance.ravel()
+    def figures(refined: RefinedPose) -> tuple[float, ...]:
+        cells, octaves, _, covariance = refined.evidence
+        return cells, octaves, *covariance.ravel()
 
     refined = walk.refined()
     assert refined.frame.outlier.any()
-    before = figures(refined.spread)
+    before, with_outliers = figures(refined), refined.evidence[2]
     refined.frame.discard_outliers()
-    assert figures(replace(refined).spread) == before
+    assert figures(replace(refined)) == before
+    assert replace(refined).evidence[2] < with_outliers
     fewer = walk.held(0.0, 40)
-    assert figures(replace(refined, frame=fewer.frame).spread) != before
+    assert figures(replace(refined, frame=fewer.frame)) != before
     refined.frame.clear_associations()
-    assert figures(refined.spread) == before, "asked for once"
+    assert figures(refined) == before, "asked for once"
 
 
 # ---- from nothing --------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from orbslam2py.slam.state import (
     SinceKeyframe,
     State,
     Unconfirmed,
+    motion,
 )
 from orbslam2py.slam.state.transitions import (
     ActivateMap,
@@ -35,6 +36,7 @@ from orbslam2py.slam.state.transitions import (
     Tracked,
     Transitions,
 )
+from support.tracking_scene import FakeCore
 
 NO_IMAGES, NOT_INITIALIZED, OK, LOST = TrackingState
 PATIENCE = 2.0
@@ -70,12 +72,19 @@ def actions(state: State, event: Any) -> tuple[Any, ...]:
     return transitions().next_state(state, event)[1]
 
 
+@pytest.fixture(autouse=True)
+def frames_without_images(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion, "core", FakeCore())
+
+
 NEW = State()
-BEGUN = after(NEW, NotInitialized(), MapBegun(frame(1)))
-FOLLOWED = after(BEGUN, Tracked(frame(2, 1.0), MANY, 0), Tracked(frame(3, 3.0), MANY, 0))
-LOST_STATE = after(FOLLOWED, NotFound(0.4))
-FOUND = after(LOST_STATE, Relocalized(frame(5, 5.0), MANY))
-CONFIRMED = after(FOUND, Tracked(frame(6, 6.0), MANY, 0))
+with pytest.MonkeyPatch.context() as patched:
+    patched.setattr(motion, "core", FakeCore())
+    BEGUN = after(NEW, NotInitialized(), MapBegun(frame(1)))
+    FOLLOWED = after(BEGUN, Tracked(frame(2, 1.0), MANY, 0), Tracked(frame(3, 3.0), MANY, 0))
+    LOST_STATE = after(FOLLOWED, NotFound(0.4))
+    FOUND = after(LOST_STATE, Relocalized(frame(5, 5.0), MANY))
+    CONFIRMED = after(FOUND, Tracked(frame(6, 6.0), MANY, 0))
 
 
 @pytest.mark.parametrize(

@@ -3,27 +3,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
 from orbslam2py import _core as core
-from orbslam2py.slam.state import Motion, Velocity
-
-TENTH_TURN = core.Pose.exp([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
-
-
-def frame(seconds: float, T_cw: core.Pose | None = None) -> Any:
-    anchors: list[Any] = []
-    return SimpleNamespace(
-        id=round(10 * seconds),
-        timestamp=seconds,
-        T_cw=T_cw,
-        big_change=0,
-        share_anchor=anchors.append,
-    )
+from orbslam2py.slam.state import Motion
 
 
 def turning(seconds: float) -> core.Pose:
@@ -31,33 +15,15 @@ def turning(seconds: float) -> core.Pose:
     return core.Pose.exp([0.0, seconds, 0.0, seconds, 0.0, 0.0])
 
 
-def test_the_interval_that_was_measured_gives_the_same_motion() -> None:
-    assert Velocity(TENTH_TURN, 0.1).over(0.3 - 0.2) is TENTH_TURN
-
-
-def test_twice_the_interval_gives_the_motion_twice() -> None:
-    twice = Velocity(turning(0.1), 0.1).over(0.2)
-    np.testing.assert_allclose(twice.matrix, (turning(0.1) @ turning(0.1)).matrix, atol=1e-12)
-
-
-def test_backwards_in_time_the_motion_is_inverse() -> None:
-    back = Velocity(turning(0.1), 0.1).over(-0.1)
-    np.testing.assert_allclose(back.matrix, turning(0.1).inverse().matrix, atol=1e-12)
-    # Frames before the start are tracked backwards: interval and motion are negative.
-    again = Velocity(turning(0.1).inverse(), -0.1).over(-0.2)
-    np.testing.assert_allclose(again.matrix, turning(0.2).inverse().matrix, atol=1e-12)
-
-
-def test_nobody_knows_a_velocity_for_longer_than_a_second() -> None:
-    velocity = Velocity(turning(0.1), 0.1)
-    np.testing.assert_allclose(velocity.over(60.0).matrix, velocity.over(1.0).matrix)
-
-
-def test_a_loop_scales_the_translation() -> None:
-    scaled = Velocity(turning(0.1), 0.1).scaled(3.0)
-    np.testing.assert_allclose(scaled.step.translation, 3 * turning(0.1).translation)
-    np.testing.assert_allclose(scaled.step.quaternion_xyzw, turning(0.1).quaternion_xyzw)
-    assert scaled.seconds == 0.1
+def frame(seconds: float, T_cw: core.Pose | None = None) -> core.TrackedFrame:
+    """A frame of ten images a second, without keypoints."""
+    scales = core.ScalePyramid(1.2, 8)
+    context = core.FrameContext(core.Camera(core.CameraOptions(50, 50, 32, 24, 64, 48)), scales)
+    extraction = core.OrbExtractor(core.OrbOptions()).extract(np.zeros((48, 64), np.uint8), None)
+    built = core.build_monocular_frame(context, round(10 * seconds), seconds, extraction)
+    tracked = core.TrackedFrame(built)
+    tracked.T_cw = T_cw
+    return tracked
 
 
 @pytest.mark.parametrize("dropped", [0, 1, 4])
@@ -65,7 +31,23 @@ def test_dropped_images_do_not_change_the_prediction(dropped: int) -> None:
     motion = Motion(frame(0.0, turning(0.0)), None, is_tracked=True).after(frame(0.1, turning(0.1)))
     later = frame(0.1 * (2 + dropped))
     motion.predict(later)
+    assert later.T_cw is not None
     np.testing.assert_allclose(later.T_cw.matrix, turning(later.timestamp).matrix, atol=1e-12)
-    tangent = motion.innovation(later)
-    assert tangent is not None
-    np.testing.assert_allclose(tangent, 0, atol=1e-12)
+    change = core.change_from_prediction(later, motion.last, motion.velocity)
+    np.testing.assert_allclose(change, 0, atol=1e-12)
+
+
+def test_a_rotation_from_elsewhere_keeps_the_predicted_place() -> None:
+    motion = Motion(frame(0.0, turning(0.0)), None, is_tracked=True).after(frame(0.1, turning(0.1)))
+    later = frame(0.2)
+    half_turn = np.array([0.0, 1.0, 0.0, 0.0])
+    motion.predict_turned(later, half_turn)
+    assert later.T_cw is not None
+    np.testing.assert_allclose(later.T_cw.center, turning(0.2).center, atol=1e-12)
+    expected = core.Pose(half_turn, np.zeros(3)) @ turning(0.1)
+    np.testing.assert_allclose(later.T_cw.rotation_matrix, expected.rotation_matrix, atol=1e-12)
+
+
+def test_a_camera_that_was_lost_in_between_has_no_velocity() -> None:
+    motion = Motion(frame(0.0, turning(0.0)), None, is_tracked=True).lost()
+    assert motion.after(frame(0.1, turning(0.1))).velocity is None

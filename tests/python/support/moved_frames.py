@@ -10,16 +10,14 @@ from orbslam2py.slam.frame_reestimation import FrameReestimation
 
 
 class MovedByAMetre(FrameReestimation):
-    """Finds every frame a metre ahead, and remembers which were asked for and how."""
+    """Finds every frame a metre ahead, and remembers which were asked for."""
 
     def __init__(self) -> None:
-        self.seen: list[tuple[int, bool]] = []
+        self.seen: list[int] = []
         self.finished: list[bool] = []
 
-    def __call__(
-        self, frame: core.TrackedFrame, *, in_doubt: bool = False, finished: bool = True
-    ) -> core.TrackedFrame:
-        self.seen.append((frame.id, in_doubt))
+    def __call__(self, frame: core.TrackedFrame, *, finished: bool = True) -> core.TrackedFrame:
+        self.seen.append(frame.id)
         self.finished.append(finished)
         assert frame.T_cw is not None
         moved = core.TrackedFrame(frame.features)

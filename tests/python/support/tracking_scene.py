@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -99,8 +98,9 @@ class FakeMap:
     def living(self, keyframe: int) -> int:
         return self.culled.get(keyframe, keyframe)
 
-    def n_keyframes_of(self, map_index: int) -> int:
-        return self.n_keyframes if map_index == self.active_map else 0
+    @property
+    def n_active_keyframes(self) -> int:
+        return self.n_keyframes
 
     def n_points_of(self, map_index: int) -> int:
         return self.n_points if map_index == self.active_map else 0
@@ -148,9 +148,7 @@ class FakeMapping:
 class FakeCore:
     """The verbs tracking calls; each takes its next answer from a list, or its usual one."""
 
-    Pose = _core.Pose
-    position_deviation = staticmethod(_core.position_deviation)
-    widened_covariance = staticmethod(_core.widened_covariance)
+    Pose, Velocity = _core.Pose, _core.Velocity
     FIRST_TEMPORARY_POINT = _core.FIRST_TEMPORARY_POINT
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)
@@ -180,6 +178,8 @@ class FakeCore:
     #: Of the inliers, after three more frames of the present speed; how far that was.
     n_staying: int = 1000
     looked_ahead: float = 0.0
+    #: What each stated covariance was made with: velocity, motion of the map, share of wrong poses.
+    stated: list[tuple[Any, Any, float]] = field(default_factory=list)
     #: Points in view that are not held before the local map is matched.
     n_visible: int = 3
 
@@ -196,29 +196,74 @@ class FakeCore:
         self.calls.append("align")
         return self.aligned.popleft() if self.aligned else None
 
-    def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
-        return SimpleNamespace(cells=self.n_cells, octaves=4, covariance=self.covariance)
+    def pose_evidence(self, frame: FakeFrame) -> tuple[int, int, float, np.ndarray]:
+        return self.n_cells, 4, self.match_error, self.covariance
 
-    def median_match_error(self, frame: FakeFrame) -> float:
-        return self.match_error
+    def predict_pose(
+        self, frame: FakeFrame, last: FakeFrame, velocity: _core.Velocity | None
+    ) -> None:
+        assert last.T_cw is not None
+        frame.T_cw = last.T_cw
+        if velocity is not None:
+            frame.T_cw = velocity.over(frame.timestamp - last.timestamp) @ last.T_cw
+        frame.share_anchor(last)
+
+    def velocity_between(
+        self, last: FakeFrame, frame: FakeFrame, *, consecutive: bool
+    ) -> _core.Velocity | None:
+        assert consecutive
+        if frame.id != last.id + 1 or frame.big_change != last.big_change:
+            return None
+        assert last.T_cw is not None and frame.T_cw is not None
+        T_cl = frame.T_cw @ last.T_cw.inverse()
+        return _core.Velocity(T_cl, frame.timestamp - last.timestamp)
+
+    def change_from_prediction(
+        self, frame: FakeFrame, last: FakeFrame, velocity: _core.Velocity | None
+    ) -> tuple[float, float]:
+        if velocity is None or frame.T_cw is None:
+            return 0.0, 0.0
+        expected = FakeFrame(frame.id)
+        self.predict_pose(expected, last, velocity)
+        assert expected.T_cw is not None
+        return frame.T_cw.difference(expected.T_cw)
+
+    def stated_covariance(
+        self,
+        covariance: np.ndarray,
+        factor: float,
+        frame: FakeFrame,
+        last: FakeFrame,
+        velocity: _core.Velocity | None,
+        map_motion: _core.Pose | None,
+        wrong_share: float,
+    ) -> np.ndarray:
+        self.stated.append((velocity, map_motion, wrong_share))
+        return factor * covariance
 
     def median_displacement(self, frame: FakeFrame, T_nw: _core.Pose) -> float:
         return self.displacement
 
     def count_staying(self, frame: FakeFrame, T_nw: _core.Pose) -> int:
-        assert frame.T_cw is not None
-        self.looked_ahead = float((T_nw.matrix - frame.T_cw.matrix)[0, 3])
+        return self.n_staying
+
+    def count_staying_after(
+        self, frame: FakeFrame, velocity: _core.Velocity, n_intervals: float
+    ) -> int:
+        self.looked_ahead = n_intervals * float(velocity.step.translation[0])
         return self.n_staying
 
     def PointBatch(self) -> str:
         return "no points"
 
-    def follow_map(self, world: FakeMap, frame: FakeFrame) -> tuple[str, float]:
+    def follow_map(self, world: FakeMap, frame: FakeFrame) -> tuple[str, float, _core.Pose | None]:
         assert frame.T_cw is not None
-        frame.T_cw = frame.T_cw @ pose(world.keyframe_x - frame.anchor_x)
+        before, big_change = frame.T_cw, frame.big_change
+        frame.T_cw = before @ pose(world.keyframe_x - frame.anchor_x)
         frame.anchor_x = world.keyframe_x
         frame.big_change = world.big_change_index
-        return "points", world.stretched
+        by_loop = frame.big_change != big_change
+        return "points", world.stretched, None if by_loop else frame.T_cw @ before.inverse()
 
     def anchor_frame(self, world: FakeMap, frame: FakeFrame, keyframe: int) -> None:
         frame.anchor_x = world.keyframe_x
@@ -263,6 +308,16 @@ class FakeCore:
         n = self.inliers.popleft() if self.inliers else 100
         return SimpleNamespace(n_inliers=n, covariance=np.eye(6) * n)
 
+    def estimate_pose(self, frame: FakeFrame) -> tuple[int, np.ndarray, np.ndarray]:
+        found = self.optimize_pose(frame)
+        return found.n_inliers, found.covariance, frame.discard_outliers()
+
+    def optimize_aligned(
+        self, world: FakeMap, frame: FakeFrame, most: int, fewest: int
+    ) -> tuple[int, int, int, np.ndarray]:
+        found = self.optimize_pose(frame)
+        return found.n_inliers, frame.n_associated(), frame.n_map_inliers(), found.covariance
+
     def pose_covariance(self, frame: FakeFrame) -> np.ndarray:
         assert frame.T_cw is not None
         return np.diag([1.0, 1, 1, 2, 2, 2])
@@ -275,12 +330,12 @@ class FakeCore:
         return SimpleNamespace(reference_keyframe=self.local_reference, points="local points")
 
     def match_local_map(
-        self, frame: FakeFrame, points: str, discarded: np.ndarray, factor: float
-    ) -> SimpleNamespace:
-        assert points == "local points"
+        self, frame: FakeFrame, local_map: SimpleNamespace, discarded: np.ndarray, factor: float
+    ) -> tuple[np.ndarray, int]:
+        assert local_map.points == "local points"
         self.radius_factors.append(factor)
         self.discarded.append(discarded)
-        return SimpleNamespace(visible=np.arange(self.n_visible))
+        return np.arange(self.n_visible), frame.n_associated() + self.n_visible
 
     def count_sightings(self, world: FakeMap, frame: FakeFrame, visible: np.ndarray) -> None:
         assert len(visible) == self.n_visible
@@ -315,7 +370,7 @@ class FakeInitializer:
     def restart(self, frames: list[FakeFrame]) -> None:
         assert not frames
 
-    def n_between(self, map_index: int) -> int:
+    def n_between(self) -> int:
         return 0
 
     def take_earlier(self) -> tuple[FakeFrame, ...]:
@@ -342,12 +397,7 @@ class FakeInitializer:
 #: Whatever is found is believed.
 CREDULOUS = AcceptanceConfig(
     sudden_share=0,
-    sudden_deviation=math.inf,
-    surprise_windows=math.inf,
     weak_share=0,
-    weak_cells=-1,
-    weak_deviation=math.inf,
-    weak_error=math.inf,
     refused_share=0,
 )
 

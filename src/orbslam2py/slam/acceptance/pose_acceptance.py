@@ -118,16 +118,13 @@ class PoseAcceptance:
                 state = state.relocalized(frame.id)
                 state = replace(state, motion=state.motion.jumped(None))
         state = self._search.settle(refined, state, fixed_map=fixed_map)
-        innovation = state.motion.innovation(frame)
-        covariance = self._judge.stated_covariance(
-            refined, evidence.match_error, state.motion, innovation
-        )
+        covariance = self._judge.stated_covariance(refined, evidence.match_error, state.motion)
         estimate = replace(
             refined.estimate, evidence=evidence, method=hypothesis.method, covariance=covariance
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE), state
-        scene = state.scene.with_error(evidence.match_error, self._judge.limits)
+        scene = state.scene.with_error(evidence.match_error)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence, state):
             scene = scene.with_pose(statistics_of(refined))
         return estimate, replace(state, scene=scene)

@@ -51,26 +51,20 @@ class PoseValidator:
             The method that found the pose.
         """
         frame, estimate = refined.frame, refined.estimate
-        spread = refined.spread
         figures, scene = statistics_of(refined), state.scene
         usual = scene.usual or figures
         turn, move = _changes(frame, state.motion)
+        cells, octaves, match_error, _ = refined.evidence
         found_to_usual = _ratio(figures.found, usual.found)
         inliers_to_usual = _ratio(estimate.n_inliers, usual.n_inliers)
         deviation_to_usual = _ratio(figures.deviation, usual.deviation)
-        match_error = core.median_match_error(frame)
         usual_error = match_error if scene.error is None else scene.error
         error_to_usual = _ratio(match_error, usual_error)
         limits = self.limits
         verdict = Verdict.STRONG
         if inliers_to_usual < limits.refused_share and estimate.n_inliers < limits.refused_inliers:
             verdict = Verdict.REFUSED
-        elif (
-            max(inliers_to_usual, found_to_usual) < limits.weak_share
-            or spread.cells <= limits.weak_cells
-            or deviation_to_usual > limits.weak_deviation
-            or scene.is_sudden_error(match_error, limits)
-        ):
+        elif max(inliers_to_usual, found_to_usual) < limits.weak_share:
             verdict = Verdict.WEAK
         return Evidence(
             verdict=verdict,
@@ -81,8 +75,8 @@ class PoseValidator:
             found=figures.found,
             found_to_usual=found_to_usual,
             inliers_to_usual=inliers_to_usual,
-            n_cells=spread.cells,
-            n_octaves=spread.octaves,
+            n_cells=cells,
+            n_octaves=octaves,
             deviation_to_usual=deviation_to_usual,
             match_error=match_error,
             error_to_usual=error_to_usual,
@@ -92,22 +86,20 @@ class PoseValidator:
 
     def needs_reestimation(self, evidence: Evidence) -> bool:
         """Return whether other methods must search the pose before it is accepted."""
-        limits = self.limits
-        return (
-            evidence.verdict is not Verdict.STRONG
-            or min(evidence.inliers_to_usual, evidence.found_to_usual) < limits.sudden_share
-            or evidence.deviation_to_usual > limits.sudden_deviation
-            or self._windows(evidence.turn_change) > limits.surprise_windows
-        )
+        least = min(evidence.inliers_to_usual, evidence.found_to_usual)
+        return evidence.verdict is not Verdict.STRONG or least < self.limits.sudden_share
 
     def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
         """Return whether two poses of a frame are equal within their uncertainty."""
         T_first, T_second = first.frame.T_cw, second.frame.T_cw
         if T_first is None or T_second is None:
             return False
-        turn, move = difference(T_first, T_second)
+        turn, move = T_first.difference(T_second)
         deviations = first.position_deviation + second.position_deviation
-        return self._windows(turn) < _SAME_WINDOWS and move <= _SAME_DEVIATIONS * deviations
+        return (
+            self._windows(math.degrees(turn)) < _SAME_WINDOWS
+            and move <= _SAME_DEVIATIONS * deviations
+        )
 
     def confirm(self, evidence: Evidence) -> Evidence:
         """A second method found the same pose: accept it, but weak evidence stays weak."""
@@ -120,7 +112,6 @@ class PoseValidator:
         refined: RefinedPose,
         match_error: float,
         motion: Motion,
-        innovation: FloatArray | None,
     ) -> FloatArray | None:
         """Return the stated covariance (6, 6) of a pose; None if it is not known.
 
@@ -138,19 +129,23 @@ class PoseValidator:
             Median error of its matches, with outliers, in standard deviations.
         motion : Motion
             The last frame and the velocity.
-        innovation : array of float64, (6,), or None
-            See `Motion.innovation`.
         """
         covariance, limits = refined.estimate.covariance, self.limits
         if covariance is None or not limits.robust_covariance:
             return covariance
-        errors = [motion.map_motion_at(refined.frame)]
-        if innovation is not None:
-            errors.append(math.sqrt(limits.wrong_share) * innovation)
-        known = [error for error in errors if error is not None]
-        # One call: NumPy's take longer than what they do here, and in each frame.
+        robust = refined.evidence[3]
         scale = max(1.0, match_error / limits.expected_error)
-        return core.widened_covariance(refined.spread.covariance, scale**2, known)
+        if motion.last_frame is None:
+            return scale**2 * robust
+        return core.stated_covariance(
+            robust,
+            scale**2,
+            refined.frame,
+            motion.last_frame,
+            motion.velocity,
+            motion.map_motion,
+            limits.wrong_share,
+        )
 
     def _windows(self, degrees: float) -> float:
         """Return how far a rotation moves the image, in search windows of the motion model."""
@@ -176,13 +171,5 @@ def _changes(frame: core.TrackedFrame, motion: Motion) -> tuple[float, float]:
     """Return the degrees and metres by which a frame differs from the predicted motion."""
     if motion.last_frame is None:
         return 0.0, 0.0
-    T_cl, T_lw, T_cw = motion.predicted(frame.timestamp), motion.last.T_cw, frame.T_cw
-    if T_cl is None or T_lw is None or T_cw is None:
-        return 0.0, 0.0
-    return difference(T_cw, T_cl @ T_lw)
-
-
-def difference(T_aw: core.Pose, T_bw: core.Pose) -> tuple[float, float]:
-    """Degrees and metres between two poses of one camera."""
-    turn, move = T_aw.difference(T_bw)
+    turn, move = core.change_from_prediction(frame, motion.last_frame, motion.velocity)
     return math.degrees(turn), move

@@ -33,7 +33,7 @@ from orbslam2py.slam.records import (
     TrackingState,
     Verdict,
 )
-from orbslam2py.slam.state import Motion, State, Velocity
+from orbslam2py.slam.state import Motion, State
 
 _log = logging.getLogger(__name__)
 
@@ -171,7 +171,7 @@ class InertialTracker:
         seconds = timestamp - state.motion.last.timestamp
         predicted = replace(
             state.motion,
-            velocity=Velocity(T_cw @ T_lw.inverse(), seconds),
+            velocity=core.Velocity(T_cw @ T_lw.inverse(), seconds),
             prediction_covariance=covariance,
         )
         return replace(state, motion=predicted)

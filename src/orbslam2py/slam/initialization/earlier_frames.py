@@ -101,7 +101,7 @@ class EarlierFrames:
             return False, state
         frame.discard_outliers()
         # Not `Motion.after`: the numbers of the frames may fall.
-        velocity = state.motion.velocity_at(frame)
+        velocity = core.velocity_between(state.motion.last, frame)
         return True, replace(state, motion=state.motion.remembering(frame, velocity))
 
 

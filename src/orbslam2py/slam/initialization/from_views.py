@@ -121,9 +121,9 @@ class MonocularInitializer(Initializer):
             self._kept.follow(frame)
             self._kept.keep_last()
 
-    def n_between(self, map_index: int) -> int:
-        """Living keyframes of the start, beyond the two that a map needs."""
-        if map_index != self._begun_map:
+    def n_between(self) -> int:
+        """Living keyframes of the start of the active map, beyond the two that a map needs."""
+        if self._map.active_map != self._begun_map:
             return 0
         return sum(self._map.living(keyframe) == keyframe for keyframe in self._between)
 

@@ -53,8 +53,8 @@ class Initializer(ABC):
         """Return the frames before the one that began the map, with poses in it, in order; once."""
         return ()
 
-    def n_between(self, map_index: int) -> int:
-        """Living keyframes of the start, beyond those that a map needs."""
+    def n_between(self) -> int:
+        """Living keyframes of the start of the active map, beyond those that a map needs."""
         return 0
 
     def remembered(self) -> list[core.Frame]:

@@ -6,13 +6,14 @@ Mur-Artal, Montiel and Tardos, 2015, section V-D; ``docs/method/tracking.md#loca
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arrays import IntArray
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._values import replace
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import AlignmentConfig, TrackingConfig
@@ -42,12 +43,13 @@ class RefinedPose:
     def position_deviation(self) -> float:
         """Return the standard deviation of the position over all directions [m]; 0 if not known."""
         covariance = self.estimate.covariance
-        return 0.0 if covariance is None else core.position_deviation(covariance)
+        variance = 0.0 if covariance is None else covariance[3:, 3:].trace()
+        return math.sqrt(max(0.0, variance))
 
     @cached_property
-    def spread(self) -> core.InlierSpread:
-        """Return how the inliers are distributed over image and depth, and their common errors."""
-        return core.spread_of_inliers(self.frame)
+    def evidence(self) -> tuple[int, int, float, FloatArray]:
+        """Return what the matches say of the pose; see `orbslam2py._core.pose_evidence`."""
+        return core.pose_evidence(self.frame)
 
 
 class LocalMapSearch:
@@ -76,7 +78,7 @@ class LocalMapSearch:
     ) -> None:
         self._map = slam_map
         self._limits = config
-        self._alignment = alignment
+        self._n_aligned = 0 if alignment is None else alignment.tracked_inliers
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
@@ -100,28 +102,20 @@ class LocalMapSearch:
         if first.visual_odometry:
             return _beyond_the_map(frame, first, state)
         local_map = core.select_local_map(self._map, frame)
-        n_held = frame.n_associated()
         window = self._usual_window
         just_begun = state.has_just_begun(frame.id, self._limits)
         if just_begun:
             window = self._limits.local_map_window_after_relocalization
-        matches = core.match_local_map(frame, local_map.points, first.discarded, window)
-        optimized = core.optimize_pose(frame)
-        visible = matches.visible
+        visible, n_predicted = core.match_local_map(frame, local_map, first.discarded, window)
         found_again = just_begun and state.found_again
-        if found_again and optimized.n_inliers >= self._limits.map_matches:
+        if found_again and core.optimize_pose(frame).n_inliers >= self._limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
             frame.discard_outliers()
-            core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
-            optimized = core.optimize_pose(frame)
-        optimized = self._aligned(frame, optimized)
-        by_image, fused = frame.T_cw, _fused(frame, optimized, state)
-        estimate = self._enough_found(frame, first, fused or optimized)
-        if fused is not None:
-            estimate = replace(estimate, by_image=by_image)
+            core.match_local_map(frame, local_map, first.discarded, self._usual_window)
+        estimate = self._optimized(frame, first, state.motion.prior())
         if estimate.visual_odometry:
             return _beyond_the_map(frame, estimate, state)
-        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
+        return RefinedPose(frame, estimate, local_map, visible, n_predicted)
 
     def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         """Match a frame with the map again, without its associations.
@@ -148,69 +142,57 @@ class LocalMapSearch:
         is_steady = n_of_map < refined.estimate.n_inliers and not in_doubt
         if local_map is None or refined.frame.T_cw is None or is_steady:
             return refined
-        frame = core.TrackedFrame(refined.frame.features)
-        frame.T_cw = refined.frame.T_cw
-        frame.share_anchor(refined.frame)
+        frame = refined.frame.pose_alone()
         nothing = np.zeros(0, np.int64)
-        for window in (_AFRESH_WINDOW, self._usual_window):
-            frame.clear_associations()
-            visible = core.match_local_map(frame, local_map.points, nothing, window).visible
-            optimized = core.optimize_pose(frame)
-        optimized = self._aligned(frame, optimized)
+        core.match_local_map(frame, local_map, nothing, _AFRESH_WINDOW)
+        core.optimize_pose(frame)
+        frame.clear_associations()
+        visible, n_predicted = core.match_local_map(frame, local_map, nothing, self._usual_window)
+        estimate = self._optimized(frame, refined.estimate, None)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
         elsewhere = in_doubt or _is_elsewhere(frame, refined)
-        if optimized.n_inliers < share * n_of_map or not elsewhere:
+        if estimate.n_inliers < share * n_of_map or not elsewhere:
             return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized)
         if estimate.visual_odometry or not estimate.found:
             return refined
-        return RefinedPose(frame, estimate, local_map, visible, len(visible))
+        return RefinedPose(frame, estimate, local_map, visible, n_predicted)
 
-    def _aligned(self, frame: core.TrackedFrame, optimized: core.PoseEstimate) -> core.PoseEstimate:
-        """Optimize once more with inliers at the places where patches put them."""
-        enough = optimized.n_inliers >= self._limits.local_map_inliers
-        alignment = self._alignment
-        if alignment is None or not (alignment.tracked_inliers and enough):
-            return optimized
-        core.align_frame(self._map, frame, alignment.tracked_inliers, alignment.noise)
-        return core.optimize_pose(frame)
-
-    def _enough_found(
-        self,
-        frame: core.TrackedFrame,
-        first: PoseEstimate,
-        optimized: core.PoseEstimate,
+    def _optimized(
+        self, frame: core.TrackedFrame, first: PoseEstimate, prior: core.PosePrior | None
     ) -> PoseEstimate:
-        """Return the pose with its matches in the local map."""
+        """Optimize the pose, with aligned inliers and the prediction of an IMU; weigh the matches.
+
+        With the prediction, the pose must keep nearly all inliers; otherwise it is that of the
+        image.
+        """
+        limits = self._limits
+        n_inliers, n_matches, n_of_map, covariance = core.optimize_aligned(
+            self._map, frame, self._n_aligned, limits.local_map_inliers
+        )
+        by_image = None
+        if prior is not None:
+            by_image = frame.T_cw
+            fused = core.optimize_pose(frame, prior)
+            if fused.n_inliers >= _KEPT * n_inliers:
+                n_inliers, covariance = fused.n_inliers, fused.covariance
+                n_of_map = frame.n_map_inliers()
+            else:
+                frame.T_cw, by_image = by_image, None
+                core.optimize_pose(frame)
         estimate = PoseEstimate(
-            n_matches=frame.n_associated(),
-            n_inliers=optimized.n_inliers,
-            covariance=optimized.covariance,
+            n_matches=n_matches,
+            n_inliers=n_inliers,
+            covariance=covariance,
             discarded=first.discarded,
             relocalized=first.relocalized,
+            by_image=by_image,
         )
-        if estimate.n_inliers < self._limits.local_map_inliers:
+        if n_inliers < limits.local_map_inliers:
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
-        if frame.n_map_inliers() < self._limits.map_matches:
+        if n_of_map < limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.
             return replace(estimate, visual_odometry=True)
         return estimate
-
-
-def _fused(
-    frame: core.TrackedFrame, optimized: core.PoseEstimate, state: State
-) -> core.PoseEstimate | None:
-    """Optimize a pose again with the prediction of an IMU, unless that costs inliers."""
-    prior = state.motion.prior()
-    if prior is None:
-        return None
-    T_cw = frame.T_cw
-    fused = core.optimize_pose(frame, prior)
-    if fused.n_inliers >= _KEPT * optimized.n_inliers:
-        return fused
-    frame.T_cw = T_cw
-    core.optimize_pose(frame)
-    return None
 
 
 def _beyond_the_map(frame: core.TrackedFrame, odometry: PoseEstimate, state: State) -> RefinedPose:

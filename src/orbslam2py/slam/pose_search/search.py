@@ -114,12 +114,12 @@ class PoseSearch:
         limits = self.limits
         n_matches = 0
         for window in (narrow, limits.motion_model_widening * narrow):
-            frame.clear_associations()
             n_matches = core.match_last_frame(
                 frame, motion.last, motion.last_points, window, self.has_depth
             )
             if n_matches >= limits.motion_model_matches:
                 return self._optimize(frame, n_matches, Reason.FEW_MATCHES_LAST_FRAME)
+            frame.clear_associations()
         return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME, n_matches)
 
     def by_keyframes(
@@ -237,14 +237,11 @@ class PoseSearch:
         return int(slam_map.root(found_in))
 
     def _optimize(self, frame: core.TrackedFrame, n_matches: int, too_few: Reason) -> PoseEstimate:
-        optimized = core.optimize_pose(frame)
+        n_inliers, covariance, discarded = core.estimate_pose(frame)
         estimate = PoseEstimate(
-            n_matches=n_matches,
-            n_inliers=optimized.n_inliers,
-            covariance=optimized.covariance,
-            discarded=frame.discard_outliers(),
+            n_matches=n_matches, n_inliers=n_inliers, covariance=covariance, discarded=discarded
         )
-        enough = estimate.n_inliers >= self.limits.map_matches
+        enough = n_inliers >= self.limits.map_matches
         return estimate if enough else estimate.failed(too_few)
 
     def settle(self, refined: RefinedPose, state: State, *, fixed_map: bool) -> State:

@@ -111,7 +111,7 @@ class Relocalizer:
         T_wc = np.array([self._map.keyframe_pose(k).inverse().matrix for k in ids])
         wider = min(1 + _WIDENING * lost.failures, _WIDEST)
         just_lost = frame.id - place.last.id <= MOTION_FRAMES
-        enough = limits.enough_near if just_lost else limits.enough
+        enough = limits.narrow if just_lost else limits.enough
         for guess in place.guesses(frame):
             nearest = self._nearest(guess, ids, T_wc)
             n_inliers = self._near(frame, guess, nearest, wider, enough)

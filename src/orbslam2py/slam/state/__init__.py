@@ -9,7 +9,7 @@ from orbslam2py.slam.state.loss import (
     LostTime,
     Unconfirmed,
 )
-from orbslam2py.slam.state.motion import Motion, Velocity
+from orbslam2py.slam.state.motion import Motion
 from orbslam2py.slam.state.scene import PoseStatistics, SceneStatistics
 from orbslam2py.slam.state.state import SinceKeyframe, State
 
@@ -25,5 +25,4 @@ __all__ = [
     "SinceKeyframe",
     "State",
     "Unconfirmed",
-    "Velocity",
 ]

@@ -16,7 +16,6 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
 from orbslam2py._values import replace
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.state.motion import Velocity
 
 #: Frames after a loss in which the pose predicted by the motion is searched.
 MOTION_FRAMES = 10
@@ -31,14 +30,14 @@ class LastKnownPose:
 
     last: core.TrackedFrame
     """The frame, with its pose."""
-    velocity: Velocity | None
+    velocity: core.Velocity | None
     """Its velocity; None if it is not known."""
     reference_keyframe: int
     """The keyframe that shares most points with it."""
 
     def following(self, slam_map: core.Map) -> LastKnownPose:
         """Move the frame and its velocity with the map."""
-        _, scale_change = core.follow_map(slam_map, self.last)
+        _, scale_change, _ = core.follow_map(slam_map, self.last)
         velocity = None if self.velocity is None else self.velocity.scaled(scale_change)
         return replace(self, velocity=velocity)
 
@@ -96,10 +95,11 @@ class LostTime:
         """Count a frame without a pose."""
         return LostTime(timestamp if self.lost_since is None else self.lost_since)
 
-    def tracked(self, timestamp: float, patience: float | None) -> LostTime:
+    def tracked(self, frame: core.TrackedFrame, patience: float | None) -> LostTime:
         """Count a frame with a pose; the loss ends once such frames outlast the patience."""
         if self.lost_since is None:
             return self
+        timestamp = frame.timestamp
         since = timestamp if self.tracked_since is None else self.tracked_since
         ended = timestamp - since >= (patience or 0.0)
         return LostTime() if ended else replace(self, tracked_since=since)

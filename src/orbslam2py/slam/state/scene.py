@@ -10,11 +10,8 @@ import math
 from dataclasses import dataclass
 
 from orbslam2py._values import replace
-from orbslam2py.slam.config import AcceptanceConfig
 
 _GAIN = 0.25  # weight of the newest frame in the running means: they forget within some frames
-_SLOW_GAIN = 0.02  # the same in the mean error, for a frame whose error is sudden
-_ERROR_SPREADS = 3.0  # mean deviations above the mean from which an error may be sudden
 
 
 @dataclass(frozen=True)
@@ -43,33 +40,19 @@ class SceneStatistics:
     error: float | None = None
     """Mean of the median match errors, in standard deviations; it depends on camera and images, not
     on the place. None: not known."""
-    error_spread: float = 0.0
-    """Mean absolute deviation of the median match error."""
 
     def elsewhere(self) -> SceneStatistics:
         """Return the state with the camera at another place, or in another map."""
         return replace(self, usual=None)
-
-    def is_sudden_error(self, error: float, limits: AcceptanceConfig) -> bool:
-        """Return whether a median match error exceeds the mean by much more than its deviation."""
-        usual = self.error
-        if usual is None or usual <= 0:
-            return False
-        return error > max(limits.weak_error * usual, usual + _ERROR_SPREADS * self.error_spread)
 
     def with_pose(self, pose: PoseStatistics) -> SceneStatistics:
         """Return the statistics with an accepted frame of strong evidence."""
         usual = pose if self.usual is None else self.usual.moved_to(pose)
         return replace(self, usual=usual)
 
-    def with_error(self, error: float, limits: AcceptanceConfig) -> SceneStatistics:
+    def with_error(self, error: float) -> SceneStatistics:
         """Return the statistics with the median match error of any accepted frame."""
         if not math.isfinite(error):
             return self
-        gain = _SLOW_GAIN if self.is_sudden_error(error, limits) else _GAIN
         usual = error if self.error is None else self.error
-        return replace(
-            self,
-            error=usual + gain * (error - usual),
-            error_spread=self.error_spread + gain * (abs(error - usual) - self.error_spread),
-        )
+        return replace(self, error=usual + _GAIN * (error - usual))

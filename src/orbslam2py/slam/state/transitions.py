@@ -220,7 +220,7 @@ class Transitions:
             actions.append(ActivateMap(frame.id, frame.reference_keyframe))
         after = replace(
             self._with_pose(state, frame, event.n_inliers),
-            lost_time=state.lost_time.tracked(frame.timestamp, self._patience),
+            lost_time=state.lost_time.tracked(frame, self._patience),
             n_lost=0,
             seeks_map=False,
             unconfirmed=None,
