@@ -73,19 +73,19 @@ def check_gravity(
             report.notes.append("the accelerometer fits the settings: only the gyro differs")
             fit = other
     report.gravity = fit
+    if fit.is_negated:
+        report.blame(
+            "sign",
+            "the accelerometer has the wrong sign: at rest it must point up, as a force does; "
+            "multiply its columns by -1",
+        )
+        return
     if _axes_differ(fit):
-        if np.array_equal(fit.best_axes, -np.eye(3)):
-            report.blame(
-                "sign",
-                "the accelerometer has the wrong sign: at rest it must point up, as a force does; "
-                "multiply its columns by -1",
-            )
-        else:
-            report.blame(
-                "axes",
-                "the axes of the accelerometer are exchanged or have wrong signs: it fits with "
-                f"{axes_text(fit.best_axes)}; correct these columns of the samples",
-            )
+        report.blame(
+            "axes",
+            "the axes of the accelerometer are exchanged or have wrong signs: it fits with "
+            f"{axes_text(fit.best_axes)}; correct these columns of the samples",
+        )
         return
     report.notes.append(
         f"gravity along the path: {fit.magnitude:.2f} m/s^2, {fit.misfit * 1e3:.0f} mm left over; "

@@ -41,8 +41,6 @@ _REACH = 0.25
 _MOVING = 0.08
 #: Largest standard deviation of the time offset [s] with which the IMU counts as tested.
 _KNOWN_OFFSET = 0.015
-#: Least ratio of the misfit with a negated accelerometer, with which its sign counts as tested.
-_KNOWN_SIGN = 1.4
 #: Share of the samples at the end of the range, above which the range is too small.
 _SATURATED = 0.01
 
@@ -261,8 +259,7 @@ def _is_tested(report: ImuReport) -> bool:
     rates, gravity = report.rates, report.gravity
     if report.open_questions or rates is None or gravity is None:
         return False
-    knows_sign = gravity.negated_misfit > _KNOWN_SIGN * gravity.misfit
-    return knows_sign and rates.offset_deviation < _KNOWN_OFFSET
+    return gravity.knows_sign and rates.offset_deviation < _KNOWN_OFFSET
 
 
 def _moving(report: ImuReport, samples: FloatArray) -> bool:
