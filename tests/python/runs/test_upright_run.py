@@ -111,9 +111,7 @@ def test_pictures_stand(done: Any, saved: SavedMap, page: RunFolder) -> None:
     same_poses(page.online, page.path, 0.2)
     assert page.map is not None
     order = np.argsort(page.map.keyframe_timestamps)
-    np.testing.assert_allclose(
-        page.map.keyframe_T_wc[order], page.keyframes.T_wc, atol=1e-6
-    )
+    np.testing.assert_allclose(page.map.keyframe_T_wc[order], page.keyframes.T_wc, atol=1e-6)
     truth = sequence.ground_truth().positions
     np.testing.assert_allclose(page.path.positions[:, 1], truth[:, 1] - truth[0, 1], atol=0.06)
     for drawn in (page.points, maps_of_run(run.result)[0].points, maps_of_file(saved)[0].points):

@@ -17,6 +17,8 @@ from orbslam2py.trajectory import Trajectory
 
 #: Relative error of gravity that may be one of the path.
 _SMALL_SCALE = 0.1
+#: Share by which the usual reading of the accelerometer then differs from gravity, too.
+_UNUSUAL = 0.03
 #: Difference of an accelerometer's misfits [m] that may be one of the path.
 _SMALL_MISFIT = 5e-3
 
@@ -92,12 +94,21 @@ def check_gravity(
         f"one unit of the path is {fit.scale:.3f} m (+/- {fit.scale_deviation:.3f})"
     )
     certain = fit.misfit < 0.05
-    if certain and abs(fit.magnitude / streams.GRAVITY - 1) > _SMALL_SCALE:
+    off = fit.magnitude / streams.GRAVITY - 1
+    if not certain or abs(off) < _SMALL_SCALE:
+        return
+    usually = streams.usual_length(t, accel) / streams.GRAVITY - 1
+    if usually * np.sign(off) > _UNUSUAL:
         report.blame(
             "scale",
             f"gravity comes out as {fit.magnitude:.2f} m/s^2; correct the scale or the bias of the "
             "accelerometer",
         )
+        return
+    report.open_questions.append(
+        f"gravity along the path comes out as {fit.magnitude:.2f} m/s^2, but the accelerometer "
+        "usually reads 9.8: the path may be wrong, as where most of the scene moves"
+    )
 
 
 def _axes_differ(fit: GravityFit) -> bool:

@@ -196,7 +196,15 @@ def _check_following(report: ImuReport, rates: RateFit) -> bool:
         return True
     damaged = any(fault.kind in ("dead", "swapped") for fault in report.faults)
     gyro_turns = rates.gyro_rms > 0.15 and rates.gyro_rms > 3 * rates.camera_rms
-    if rates.camera_rms > 2 * _TURNING or gyro_turns:
+    camera_turns = rates.camera_rms > 2 * _TURNING
+    if camera_turns and rates.gyro_rms < _TURNING and not damaged:
+        report.open_questions.append(
+            f"the images turn with {rates.camera_rms:.2f} rad/s, but the gyro is at rest: the "
+            "scene moves, or the samples are of another recording; record 10 s with turns about "
+            "all axes"
+        )
+        return False
+    if camera_turns or gyro_turns:
         if not damaged:
             report.blame(
                 "unrelated",

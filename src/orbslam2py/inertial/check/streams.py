@@ -22,7 +22,7 @@ _STEEP = 3e-3
 
 
 def usual_length(t: FloatArray, readings: FloatArray) -> float:
-    """Return the median length of readings (n, 3) at seconds (n,), each the mean over half a second.
+    """Return the median length of means over half a second of readings (n, 3) at seconds (n,).
 
     Shaking has a mean near zero: what remains of the specific force is gravity.
     """
@@ -33,7 +33,8 @@ def usual_length(t: FloatArray, readings: FloatArray) -> float:
     span = min(_SPAN, float(t[-1] - t[0]))
     begin = t[t <= t[-1] - span + 1e-9]
     first, last = (
-        np.column_stack([np.interp(at, t, one) for one in integral.T]) for at in (begin, begin + span)
+        np.column_stack([np.interp(at, t, one) for one in integral.T])
+        for at in (begin, begin + span)
     )
     return float(np.median(np.linalg.norm(last - first, axis=1))) / span
 
