@@ -40,8 +40,8 @@ _REACH = 0.25
 #: Rates [rad/s], root mean square, from which on an axis without any change is dead.
 _MOVING = 0.08
 #: Largest standard deviation of the time offset [s] with which the IMU counts as tested: slow
-#: motion does not show it, and an error that does not show does no harm in it. The tests go on until
-#: it is known to the second value, because faster motion may follow.
+#: motion does not show it, and an error that does not show does no harm in it. The tests go on
+#: until it is known to the second value, because faster motion may follow.
 _USABLE_OFFSET, _KNOWN_OFFSET = 0.04, 0.015
 #: Share of the samples at the end of the range, above which the range is too small.
 _SATURATED = 0.01
