@@ -112,9 +112,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     if arguments.faults is not None:
         told = []
-        for one in faults.played(arguments.faults, arguments.sensors, arguments.seeds):
-            told.append(one)
-            print(one, file=sys.stderr)
+        for result in faults.played(arguments.faults, arguments.sensors, arguments.seeds):
+            told.append(result)
+            print(result, file=sys.stderr)
         faults.show(told, console_of(arguments))
         return 0
     config = dict(one.split("=", 1) for one in arguments.set)

@@ -183,14 +183,14 @@ def _told(fault: Fault, sequence: SyntheticSequence, images: Sequence[Any], seed
     system = orb.System(sequence.default_settings(), sensor, deterministic=True, imu=given.settings)
     first: float | None = None
     fits = False
+    check = system.imu_check
+    assert check is not None
     with system as slam:
         slam.add_imu(given.samples)
         for image, timestamp in zip(given.images, sequence.timestamps.tolist(), strict=True):
             record = slam.track(image, timestamp)
             if first is None and record.state is TrackingState.OK:
                 first = timestamp
-            check = slam.imu_check
-            assert check is not None
             fits |= check.verdict is ImuVerdict.FITS
             if check.verdict is ImuVerdict.HELD_BACK:
                 break
