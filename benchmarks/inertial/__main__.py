@@ -3,6 +3,7 @@
 
 python -m benchmarks.inertial --seeds 2
 python -m benchmarks.inertial --only "room, shakes" --sensors mono
+python -m benchmarks.inertial --faults --seeds 20
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from rich.console import Console
 
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.tables import new_table
+from benchmarks.inertial import faults
 from benchmarks.inertial.cases import CHIPS, SENSORS, SITUATIONS, cases
 from benchmarks.inertial.judgement import Row
 from benchmarks.inertial.runs import all_rows
@@ -101,7 +103,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="threshold"
     )
+    parser.add_argument(
+        "--faults",
+        nargs="*",
+        choices=[one.name for one in faults.FAULTS],
+        help="play faults of the IMU on purpose instead [all]",
+    )
     arguments = parser.parse_args(argv)
+    if arguments.faults is not None:
+        told = []
+        for result in faults.played(arguments.faults, arguments.sensors, arguments.seeds):
+            told.append(result)
+            print(result, file=sys.stderr)
+        faults.show(told, console_of(arguments))
+        return 0
     config = dict(one.split("=", 1) for one in arguments.set)
     rows: list[Row] = []
     chosen = cases(arguments.only, arguments.sensors, arguments.seeds)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arguments import instance_of
-from orbslam2py._arrays import ByteArray, IntArray
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
     ArrayGroup,
@@ -121,6 +121,19 @@ class MapContents:
             sums = np.bincount(point, seen[:, channel], len(self.points))
             colours[n > 0, channel] = np.rint(sums[n > 0] / n[n > 0]).astype(np.uint8)
         return colours
+
+    def anchor(self, row: int = 0) -> FloatArray:
+        """Return the transform (4, 4) from the world of a map to that of its paths.
+
+        Paths are relative to the first keyframe of their map; an upright map keeps its own world.
+
+        Parameters
+        ----------
+        row
+            Of the map's first keyframe in `keyframes`.
+        """
+        is_upright = int(self.keyframes.ids[row]) in self.upright_roots
+        return np.eye(4) if is_upright else np.asarray(self.keyframes.T_cw[row])
 
     def arrays(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """All arrays with their names (``"points.positions"``), in a fixed order."""

@@ -15,6 +15,7 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.changes import MapFollower
+from orbslam2py.trajectory.level import moved
 from orbslam2py.trajectory.rotations import inverse_poses
 
 _FORMAT = 1
@@ -47,7 +48,9 @@ class MapArrays:
 
     @classmethod
     def of(cls, slam_map: core.Map, map_index: int | None = None) -> MapArrays:
-        """Copy the drawn parts of a map at rest, in the frame of its first keyframe.
+        """Copy the drawn parts of a map at rest, in the world of its trajectory.
+
+        That is the frame of its first keyframe; an upright map keeps its own world.
 
         Parameters
         ----------
@@ -76,16 +79,17 @@ class MapArrays:
             spanning_tree=_pairs(changes.spanning_tree),
             loop_edges=_pairs(changes.loop_edges),
         )
-        return arrays._anchored()
+        which = slam_map.active_map if map_index is None else map_index
+        if not len(arrays.keyframe_ids) or slam_map.is_upright(which):
+            return arrays
+        return arrays.moved(inverse_poses(arrays.keyframe_T_wc[0]))
 
-    def _anchored(self) -> MapArrays:
-        if not len(self.keyframe_ids):
-            return self
-        T_0w = inverse_poses(self.keyframe_T_wc[0])
+    def moved(self, T: FloatArray) -> MapArrays:
+        """Return the same map in another world; the transform (4, 4) leads to it."""
         return replace(
             self,
-            keyframe_T_wc=T_0w @ self.keyframe_T_wc,
-            point_positions=self.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3],
+            keyframe_T_wc=T @ self.keyframe_T_wc,
+            point_positions=moved(T, self.point_positions),
         )
 
     def save(self, path: str | Path) -> None:

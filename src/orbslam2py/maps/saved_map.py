@@ -158,7 +158,9 @@ class SavedMap:
         fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
         restore_contents(self.contents, slam_map, vocabulary, index, words_fit=fits)
 
-    def trajectory(self, run: int = -1, map_number: int | None = None) -> Trajectory:
+    def trajectory(
+        self, run: int = -1, map_number: int | None = None, *, in_world: bool = False
+    ) -> Trajectory:
         """Return the poses of the images of a run in the present map.
 
         Parameters
@@ -168,12 +170,14 @@ class SavedMap:
         map_number
             Number of the map, from 0 for the oldest; by default the one with most images of the
             run.
+        in_world
+            In the world of the map, whatever its first keyframe.
 
         Returns
         -------
         Trajectory
-            Trajectory of the images in that map, relative to its first keyframe; empty if the map
-            has no runs.
+            Trajectory of the images in that map, relative to its first keyframe, or in the world of
+            a map that an IMU has turned upright; empty if the map has no runs.
 
         Raises
         ------
@@ -201,8 +205,8 @@ class SavedMap:
             rotations_from_quaternions(frames.T_cr[:, :4]), scale[:, None] * frames.T_cr[:, 4:]
         )
         T_wc = inverse_poses(T_cr @ T_rw)
-        if len(frames):
-            T_wc = self.contents.keyframes.T_cw[root] @ T_wc
+        if len(frames) and not in_world:
+            T_wc = self.contents.anchor(root) @ T_wc
         T_wc[frames.keyframes < 0] = np.eye(4)
         return Trajectory(frames.timestamps, T_wc, frames.lost != 0, frames.ids)
 

@@ -16,6 +16,8 @@ from orbslam2py.trajectory import Trajectory
 class MapSnapshot:
     """A consistent copy of a map, in the frame of its first keyframe's first pose (the world).
 
+    Of a map that an IMU has turned upright, the world has z up.
+
     Each of several maps has a separate world: the relative pose of two maps is not known. Two
     snapshots are equal if all their arrays are, bit by bit.
     """
@@ -34,6 +36,8 @@ class MapSnapshot:
     """(l, 2) ids of the keyframes that a closed loop connects."""
     map_index: int = field(default=0, compare=False)
     """Number of its map, as in `TrackingRecord.map_index`; not compared."""
+    is_upright: bool = field(default=False, compare=False)
+    """Whether an IMU has turned the map upright; not compared."""
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MapSnapshot):
@@ -77,6 +81,7 @@ def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapsh
         point_positions=points.positions,
         loop_edges=snapshot.loop_edges,
         map_index=chosen,
+        is_upright=bool(slam_map.is_upright(chosen)),
     )
 
 

@@ -65,6 +65,8 @@ class _News:
     record: TrackingRecord
     step: OdometryStep | None
     seen: SeenImage | None
+    is_upright: bool
+    """Whether an IMU has turned the map of the pose upright."""
 
 
 class RosOutput:
@@ -107,7 +109,9 @@ class RosOutput:
         self._base = base
         self._stamp_of = stamp_of
         self._odometry = SmoothOdometry(system.pipeline.back_end.map)
-        self._follower = MapFollower(system.pipeline.back_end.map)
+        self._slam_map = system.pipeline.back_end.map
+        self._odom_is_upright: bool | None = None
+        self._follower = MapFollower(self._slam_map)
         self._map = GrowingMap()
         self._keyframes: dict[int, tuple[float, FloatArray]] = {}
         self._before: TrackingRecord | None = None
@@ -151,7 +155,10 @@ class RosOutput:
 
     # ---- in the thread that tracks ---------------------------------------------------------------
     def _see(self, watched: WatchedFrame) -> None:
-        news = _News(watched.record, self._odometry.add(watched), self._images.seen(watched))
+        record = watched.record
+        is_upright = bool(self._slam_map.is_upright(record.map_index))
+        step, seen = self._odometry.add(watched), self._images.seen(watched)
+        news = _News(record, step, seen, is_upright)
         if self._every_image:
             while self._thread.is_alive():
                 with contextlib.suppress(queue.Full):
@@ -198,12 +205,16 @@ class RosOutput:
             )
         self._map_index = record.map_index
         robot, base = self._base.robot, self._base.name
-        T_mb, T_ob = robot.pose(record.T_wc), robot.pose(step.T_oc)
+        is_upright = news.is_upright
+        T_mb = robot.pose(record.T_wc, is_upright=is_upright)
+        if self._odom_is_upright is None:  # it begins in the world of the first pose
+            self._odom_is_upright = is_upright
+        T_ob = robot.pose(step.T_oc, is_upright=self._odom_is_upright)
         in_map = Heading(self._stamp, MAP)
         self._send("pose", messages.pose_stamped(in_map, T_mb))
         if record.covariance is not None:
             covariance = robot.covariance(
-                record.covariance, (robot.T_base_camera @ record.T_wc)[:3, :3]
+                record.covariance, (robot.to_map(is_upright) @ record.T_wc)[:3, :3]
             )
             message = messages.pose_with_covariance(in_map, T_mb, covariance)
             self._send("pose_with_covariance", message)
@@ -235,7 +246,8 @@ class RosOutput:
             of_twist = robot.covariance(both, T_bc[:3, :3]) / step.seconds**2
         else:
             of_twist = _UNKNOWN * np.eye(6)
-        covariance = robot.covariance(record.covariance, (T_bc @ step.T_oc)[:3, :3])
+        T_oc = robot.to_map(bool(self._odom_is_upright)) @ step.T_oc
+        covariance = robot.covariance(record.covariance, T_oc[:3, :3])
         head = Heading(self._stamp, ODOM)
         message = messages.odometry(head, self._base.name, T_ob, covariance, twist, of_twist)
         self._send("odom", message)
@@ -256,11 +268,15 @@ class RosOutput:
             self._keyframes[number] = (seconds, np.asarray(T_wc, np.float64))
         robot, head = self._base.robot, Heading(self._stamp, MAP)
         positions = np.asarray(self._map.picture().points, np.float64)
-        self._send("points", messages.points(head, robot.points(positions)))
+        # Asked after the changes: a map is turned first, then called upright.
+        is_upright = bool(self._slam_map.is_upright(changes.map_index))
+        positions = robot.points(positions, is_upright=is_upright)
+        self._send("points", messages.points(head, positions))
         order = sorted(self._keyframes.values(), key=lambda one: one[0])
         if order:
             stamps = [self._stamp_of(seconds) for seconds, _ in order]
-            poses = robot.pose(np.stack([T_wc for _, T_wc in order]))
+            T_wc = np.stack([T_wc for _, T_wc in order])
+            poses = robot.pose(T_wc, is_upright=is_upright)
             self._send("path", messages.path(head, stamps, poses))
 
     def _say_state(self, state: str) -> None:

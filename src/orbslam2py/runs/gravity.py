@@ -34,6 +34,11 @@ class Height:
         """Use the first camera's own up direction, if its orientation is unknown."""
         return cls(_UP_IN_CAMERA, "up in the\nfirst keyframe")
 
+    @classmethod
+    def of_level_axes(cls) -> Height:
+        """Use the up direction of level axes (`level_frame`)."""
+        return cls(_UP_IN_CAMERA, "height over\nthe start")
+
     def of(self, positions: FloatArray) -> FloatArray:
         """Height (n,) of positions (n, 3) above the first keyframe."""
         return np.asarray(positions @ self.up)

@@ -11,13 +11,17 @@ from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.units import unit_of
+from orbslam2py.runs.gravity import Height
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.several_maps import draw_maps, maps_of_file
 from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.level import level_frame, moved
 
 
 def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
-    """Draw a saved map into a picture, in the frame of the first keyframe's camera.
+    """Draw a saved map into a picture, in the axes of the first keyframe's camera.
+
+    An upright map is drawn in level axes (`level_frame`).
 
     Each of several maps has a separate panel, colour and world.
 
@@ -42,26 +46,30 @@ def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
     if np.count_nonzero(keyframes.parent < 0) > 1:
         draw_maps(path, maps_of_file(saved), title=title, unit=unit_of(contents))
         return
-    T_0w = keyframes.T_cw[0]
+    is_upright = len(contents.upright_roots) > 0
+    # From the world of paths, and from that of the map.
+    T_d0 = level_frame(keyframes.T_wc[0]) if is_upright else np.eye(4)
+    T_dw = T_d0 @ contents.anchor()
     paths = [saved.trajectory(run) for run in range(len(saved.runs))]
     paths = [one.select(~one.lost) for one in paths if not one.lost.all()]
     if not paths:
-        paths = [Trajectory(keyframes.timestamps, T_0w @ keyframes.T_wc)]
+        paths = [Trajectory(keyframes.timestamps, contents.anchor() @ keyframes.T_wc)]
     seconds, gaps = _one_after_the_other(paths)
     rows = np.searchsorted(keyframes.ids, contents.loop_edges)
-    centres = _moved(T_0w, keyframes.T_wc[:, :3, 3])
+    centres = moved(T_dw, keyframes.T_wc[:, :3, 3])
     draw_trajectory(
         path,
         title=title,
         subtitle=f"{number_of(len(saved.runs), 'run')}, {number_of(len(keyframes), 'keyframe')}, "
         f"{number_of(len(contents.points), 'point')}",
-        positions=np.concatenate([one.positions for one in paths]),
+        positions=moved(T_d0, np.concatenate([one.positions for one in paths])),
         seconds=seconds,
         keyframes=centres,
-        points=_moved(T_0w, contents.points.positions),
+        points=moved(T_dw, contents.points.positions),
         loops=centres[rows],
         gaps=gaps,
         unit=unit_of(contents),
+        height=Height.of_level_axes() if is_upright else None,
     )
 
 
@@ -77,7 +85,3 @@ def _one_after_the_other(paths: list[Trajectory]) -> tuple[FloatArray, np.ndarra
         gaps.append(missing)
         begin += float(since[-1]) + 1.0
     return np.concatenate(seconds), np.concatenate(gaps)
-
-
-def _moved(T: FloatArray, positions: FloatArray) -> FloatArray:
-    return np.asarray(positions @ T[:3, :3].T + T[:3, 3])

@@ -68,8 +68,8 @@ def draw_trajectory(
     title, subtitle : str
         Two lines of text above the picture.
     positions : array of float64, (n, 3)
-        Camera positions in `unit`, in the camera frame of the first image (x right, y down, z
-        forward).
+        Camera positions in `unit`, in the camera frame of the first keyframe (x right, y down, z
+        forward), or in level axes there (`level_frame`).
     seconds : array of float64, (n,)
         Time since the first image.
     keyframes : array of float64, (k, 3)

@@ -223,6 +223,7 @@ def maps_entry(result: RunResult) -> list[dict[str, Any]]:
     """Entry of report.json about all maps, also dropped and merged ones."""
     there = {summary.map_index: summary for summary in result.maps}
     merged_into = {merge.merged_map: merge.map_index for merge in result.merges}
+    upright = {one.map_index for one in (result.snapshot, *result.other_maps) if one.is_upright}
     entries = []
     for number, path in enumerate(result.trajectories):
         summary = there.get(number)
@@ -242,6 +243,7 @@ def maps_entry(result: RunResult) -> list[dict[str, Any]]:
                 "keyframes": 0 if summary is None else summary.n_keyframes,
                 "map_points": 0 if summary is None else summary.n_map_points,
                 "tracked": int(np.count_nonzero(~path.lost)),
+                "upright": number in upright,
             }
         )
     return entries

@@ -12,12 +12,14 @@ import numpy.typing as npt
 from orbslam2py._arguments import number_of
 from orbslam2py.evaluation import Alignment
 from orbslam2py.runs.frame_errors import position_errors
+from orbslam2py.runs.gravity import Height
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page.explained import compared_over
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.several_maps import draw_maps, maps_of_run
 from orbslam2py.runs.timeline import Timeline
+from orbslam2py.trajectory.level import level_frame, moved
 
 #: Least number of poses with a true one at their time to compute the scale.
 _POSES_FOR_SCALE = 3
@@ -30,12 +32,11 @@ def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
         return snapshot.point_positions
     first = int(np.argsort(snapshot.keyframe_timestamps, kind="stable")[0])
     T_0w = result.keyframes.T_wc[0] @ np.linalg.inv(snapshot.keyframe_T_wc[first])
-    points: npt.NDArray[np.float64] = snapshot.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3]
-    return points
+    return moved(T_0w, snapshot.point_positions)
 
 
 def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
-    """Both keyframes of every loop of the main map, (l, 2, 3), in the frame of keyframe 0."""
+    """Both keyframes of every loop of the main map, (l, 2, 3), in the world of its path."""
     snapshot = result.snapshot
     rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
     return np.asarray(result.keyframes.positions[rows])
@@ -52,6 +53,8 @@ def draw_run(
         If the file cannot be written.
     """
     last = result.tracked_trajectory()
+    is_upright = result.snapshot.is_upright and len(result.keyframes) > 0
+    T_dw = level_frame(result.keyframes.T_wc[0]) if is_upright else np.eye(4)
     merged_into = {merge.merged_map: merge.map_index for merge in result.merges}
     timeline = Timeline.of(result.rows, result.main_map, merged_into)
     begin = float(result.rows[0].timestamp)
@@ -71,25 +74,32 @@ def draw_run(
     if evaluation is not None:
         if report["ate_rmse_m"] is not None:
             errors = position_errors(last, evaluation.truth, scale)
-        truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
+        true_positions = scale * moved(T_dw, evaluation.truth.positions)
+        truth = (evaluation.truth.timestamps - begin, true_positions)
         if report["ate_rmse_m"] is not None:
             subtitle += f", ATE {report['ate_rmse_m']:.4f} m {compared_over(report)}"
     draw_trajectory(
         path,
         title=f"{report['sequence']} ({report['sensor']})",
         subtitle=subtitle,
-        positions=scale * last.positions,
+        positions=scale * moved(T_dw, last.positions),
         seconds=last.timestamps - begin,
-        keyframes=scale * result.keyframes.positions,
-        points=scale * anchored_points(result),
+        keyframes=scale * moved(T_dw, result.keyframes.positions),
+        points=scale * moved(T_dw, anchored_points(result)),
         truth=truth,
-        loops=scale * _loop_positions(result),
+        loops=scale * moved(T_dw, _loop_positions(result)),
         gaps=timeline.gaps_before(last.indices),
         errors=errors,
         timeline=timeline,
         unit=unit,
-        height=None if evaluation is None else evaluation.height,
+        height=_height(evaluation, is_upright=is_upright),
     )
+
+
+def _height(evaluation: RunEvaluation | None, *, is_upright: bool) -> Height | None:
+    if is_upright:
+        return Height.of_level_axes()
+    return None if evaluation is None else evaluation.height
 
 
 def draw_maps_of_run(path: Path, result: RunResult, report: dict[str, Any]) -> None:

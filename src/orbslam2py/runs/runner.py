@@ -33,6 +33,7 @@ from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.depth_check import doubt_of_tum_factor
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.inertial.map_moves import in_last_world
 from orbslam2py.slam.records import PoseMethod, TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory.trajectory import Trajectory
@@ -367,6 +368,7 @@ class SequenceRunner:
                 if row.record.map_index == main or row.record.timestamp not in by_time:
                     by_time[row.record.timestamp] = position
         # A map may hold frames from before it, when one before it came to nothing.
+        self._move_earlier_poses(system)
         result.trajectories = [
             _renumber(
                 t,
@@ -393,6 +395,18 @@ class SequenceRunner:
         result.loops = system.loops
         result.merges = system.merges
         result.full_adjustments = system.full_adjustments
+
+    def _move_earlier_poses(self, system: System) -> None:
+        """Give the poses from before the IMU turned a map upright in the world of the map."""
+        tracker = system.pipeline.inertial_tracker
+        if tracker is None or not tracker.map_moves:
+            return
+        self.result.rows = [
+            row
+            if row.record is None
+            else replace(row, record=in_last_world(row.record, tracker.map_moves))
+            for row in self.result.rows
+        ]
 
 
 def main_map(system: System, trajectories: list[Trajectory]) -> int:

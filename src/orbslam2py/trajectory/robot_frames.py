@@ -2,7 +2,8 @@
 """Poses of a robot from poses of its camera: the conventions of REP 103 and REP 105.
 
 A camera looks along +z, x is right, y is down (an optical frame). A robot's x is forward, y is
-left, z is up. ``map`` is where the robot's base was at the first keyframe of the map.
+left, z is up. ``map`` is where the robot's base was at the first keyframe of the map. Where an IMU
+has turned the map upright, ``map`` is at the camera's position there, with z up.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.trajectory.level import T_LEVEL, moved
 from orbslam2py.trajectory.rotations import inverse_poses
 
 #: From the coordinates of a camera that looks forward to those of a robot: x, y, z of the robot are
@@ -38,15 +40,21 @@ class RobotBase:
 
     T_base_camera: FloatArray = field(default_factory=pose_of_forward_camera)
 
-    def pose(self, T_wc: FloatArray) -> FloatArray:
-        """Return ``T_map_base`` (..., 4, 4) of poses ``T_wc`` (..., 4, 4) of the camera."""
-        T: FloatArray = self.T_base_camera @ T_wc @ inverse_poses(self.T_base_camera)
+    def pose(self, T_wc: FloatArray, *, is_upright: bool = False) -> FloatArray:
+        """Return ``T_map_base`` (..., 4, 4) of poses ``T_wc`` (..., 4, 4) of the camera.
+
+        `is_upright`: an IMU has turned the world, which has z up.
+        """
+        T: FloatArray = self.to_map(is_upright) @ T_wc @ inverse_poses(self.T_base_camera)
         return T
 
-    def points(self, points: FloatArray) -> FloatArray:
+    def points(self, points: FloatArray, *, is_upright: bool = False) -> FloatArray:
         """Return points (n, 3) of the map's world in the coordinates of ``map``."""
-        T = self.T_base_camera
-        return np.asarray(points @ T[:3, :3].T + T[:3, 3], np.float64)
+        return moved(self.to_map(is_upright), np.asarray(points, np.float64))
+
+    def to_map(self, is_upright: bool) -> FloatArray:
+        """Return the transform (4, 4) from the map's world to ``map``."""
+        return pose_of_forward_camera() @ T_LEVEL if is_upright else self.T_base_camera
 
     def covariance(self, covariance: FloatArray, R_axes_camera: FloatArray) -> FloatArray:
         """Convert the covariance of a camera's pose to that of the base, in ROS's order.

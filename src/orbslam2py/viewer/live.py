@@ -31,6 +31,7 @@ from orbslam2py.trajectory import Trajectory
 from orbslam2py.viewer.actions import ActionsOnSystem
 from orbslam2py.viewer.controls import RunActions
 from orbslam2py.viewer.frusta import vertical_angle
+from orbslam2py.viewer.level_map import level_positions
 from orbslam2py.viewer.process import Companion, CompanionError
 from orbslam2py.viewer.process.messages import PathNow, Subject
 from orbslam2py.viewer.publisher import Publisher
@@ -207,6 +208,9 @@ class LiveView:
 
     def look_from(self, eye: npt.NDArray[np.float64], target: npt.NDArray[np.float64]) -> None:
         """Fix the view of all browsers at a position (3,), looking at another, world."""
+        if self._system is not None:
+            slam_map = self._system.pipeline.back_end.map
+            eye, target = level_positions(np.stack([eye, target]), slam_map)
         with contextlib.suppress(CompanionError):
             self._companion.tell("look_from", eye, target)
 
@@ -239,10 +243,11 @@ class LiveView:
     def _path(self) -> PathNow:
         assert self._system is not None
         begin = time.perf_counter()
-        path = self._system.trajectory()
+        path, slam_map = self._system.trajectory(), self._system.pipeline.back_end.map
         return PathNow(
             path.timestamps,
-            np.ascontiguousarray(path.positions),
+            np.ascontiguousarray(level_positions(path.positions, slam_map)),
+            bool(slam_map.is_upright(slam_map.active_map)),
             path.lost,
             time.perf_counter() - begin,
         )

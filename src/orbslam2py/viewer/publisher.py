@@ -27,10 +27,11 @@ from orbslam2py._arguments import is_number, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import describe_error
 from orbslam2py.errors import StateError
-from orbslam2py.maps.changes import MapChanges, MapFollower
+from orbslam2py.maps.changes import MapChanges
 from orbslam2py.slam.events import Event
 from orbslam2py.slam.system import System
 from orbslam2py.slam.watched_frame import WatchedFrame
+from orbslam2py.viewer.level_map import LevelMapFollower, turned_record
 from orbslam2py.viewer.resting_maps import RestingMapsFollower, RestingMapsWatcher
 from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
 
@@ -56,6 +57,9 @@ class Publisher:
     The system is delayed only by the copy of the image and its keypoints: watchers work in the
     publisher's thread. Frames that come too fast for the watchers are skipped, except the last one
     and keyframes; the records of all are kept.
+
+    Maps that an IMU has turned upright are given in a world with y down, as those without an IMU:
+    keyframes, points, and the poses of records.
 
     Parameters
     ----------
@@ -106,7 +110,7 @@ class Publisher:
         self._frame_period = 0.0 if every_frame else 1.0 / frame_rate
         self._map_period = 1.0 / map_rate
         self._every_frame = every_frame
-        self._follower = MapFollower(system.pipeline.back_end.map)
+        self._follower = LevelMapFollower(system.pipeline.back_end.map)
         self._resting = RestingMapsFollower(system.pipeline.back_end.map)
         self._condition = threading.Condition()
         #: With the changes of the map that were seen with the image, when none is passed over.
@@ -188,7 +192,7 @@ class Publisher:
         temporary = (ids < 0) | (ids >= core.FIRST_TEMPORARY_POINT)
         return FrameView(
             image=_copied(frame.image, rgb=self._rgb),
-            record=frame.record,
+            record=turned_record(frame.record, self._pipeline.back_end.map),
             earlier=(),
             features=features,
             pixels=frame.pixels(),

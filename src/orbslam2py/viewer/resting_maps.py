@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from orbslam2py import _core as core
-from orbslam2py.maps.changes import MapChanges, MapFollower
+from orbslam2py.maps.changes import MapChanges
+from orbslam2py.viewer.level_map import LevelMapFollower
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ class RestingMapsFollower:
     def __init__(self, slam_map: core.Map) -> None:
         self._map = slam_map
         self._epoch = slam_map.epoch
-        self._followers: dict[int, MapFollower] = {}
+        self._followers: dict[int, LevelMapFollower] = {}
         self._told: tuple[int, tuple[int, ...]] = (int(slam_map.active_map), ())
 
     def update(self) -> RestingMaps | None:
@@ -66,7 +67,7 @@ class RestingMapsFollower:
         if self._map.epoch != self._epoch:
             self._epoch, self._followers = self._map.epoch, {}
         self._followers = {
-            number: self._followers.get(number) or MapFollower(self._map, map_index=number)
+            number: self._followers.get(number) or LevelMapFollower(self._map, map_index=number)
             for number in there
         }
         changes = [follower.update() for follower in self._followers.values()]

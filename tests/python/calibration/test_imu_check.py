@@ -209,6 +209,66 @@ def test_a_coarse_reading_at_rest_is_not_saturated():
     assert saturated(np.clip(np.sin(np.arange(4000) * 0.05), -0.8, 0.8)).sum() > 1000
 
 
+def shaken(data):
+    """The same samples, shaken five times a second with 20 m/s^2."""
+    changed = data.copy()
+    seconds = data[:, :1] - data[0, 0]
+    changed[:, 4:] += 20 * np.sin(2 * np.pi * (5 * seconds + [0.0, 0.3, 0.6]))
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "factor"),
+    [("g", [0, 1, 2, 3, 4, 5], 1 / 9.81), ("swapped", [3, 4, 5, 0, 1, 2], 1.0)],
+)
+def test_shaking_does_not_hide_gravity(recording, kind, order, factor):
+    data, _ = recording
+    changed = shaken(data)
+    changed[:, 4:] *= factor
+    changed[:, 1:] = changed[:, 1:][:, order]
+    lost = Trajectory([START, START + 1], np.stack([np.eye(4)] * 2), np.array([True, True]))
+    assert [fault.kind for fault in report_of(changed, lost).faults] == [kind]
+    assert report_of(shaken(data), lost).faults == []
+
+
+def test_a_saturated_gyro_is_not_called_turned(recording):
+    data, path = recording
+    changed = data.copy()
+    limit = np.quantile(np.abs(data[:, 3]), 0.7)
+    changed[:, 3] = np.clip(data[:, 3], -limit, limit)
+    assert [fault.kind for fault in report_of(changed, path).faults] == ["saturated"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_small_motion_tells_the_sign(seed):
+    """Millimetres suffice if the path is as exact."""
+    data, path = made_up(seed, seconds=6.0)
+    for sign, faults in ((1, []), (-1, ["sign"])):
+        changed = data.copy()
+        changed[:, 4:] *= sign
+        report = report_of(changed, path)
+        assert [fault.kind for fault in report.faults] == faults
+        assert report.gravity.knows_sign == (sign > 0)
+        assert report.gravity.is_negated == (sign < 0)
+
+
+def test_a_scene_that_turns_is_no_fault_of_a_gyro_at_rest():
+    data, _ = made_up(swing=0.0)
+    _, path = made_up()
+    report = report_of(data, path)
+    assert report.faults == []
+    assert any("the scene moves" in one for one in report.open_questions)
+
+
+def test_a_scene_that_falls_is_no_fault_of_the_accelerometer(recording):
+    data, path = recording
+    T_wc = path.T_wc.copy()
+    T_wc[:, 1, 3] -= 0.3 * 0.5 * 2.0 * (path.timestamps - START) ** 2
+    report = report_of(data, Trajectory(path.timestamps, T_wc))
+    assert report.faults == []
+    assert any("the path may be wrong" in one for one in report.open_questions)
+
+
 def test_the_picture(tmp_path, recording):
     data, path = recording
     report = report_of(data, path)

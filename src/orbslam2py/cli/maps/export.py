@@ -236,11 +236,10 @@ def frame_path(saved: SavedMap) -> Trajectory:
     DatasetError
         If the map has none.
     """
-    path = saved.trajectory()
+    path = saved.trajectory(in_world=True)
     if path.lost.all():
         raise DatasetError("the map has no frames of a run; leave --frames out for its keyframes")
-    T_w0 = saved.contents.keyframes.T_wc[0]
-    return Trajectory(path.timestamps, T_w0 @ path.T_wc, path.lost, path.indices)
+    return path
 
 
 def _what(saved: SavedMap, file_format: ExportFormat) -> str:

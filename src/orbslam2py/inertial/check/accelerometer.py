@@ -17,6 +17,8 @@ from orbslam2py.trajectory import Trajectory
 
 #: Relative error of gravity that may be one of the path.
 _SMALL_SCALE = 0.1
+#: Share by which the usual reading of the accelerometer then differs from gravity, too.
+_UNUSUAL = 0.03
 #: Difference of an accelerometer's misfits [m] that may be one of the path.
 _SMALL_MISFIT = 5e-3
 
@@ -73,31 +75,40 @@ def check_gravity(
             report.notes.append("the accelerometer fits the settings: only the gyro differs")
             fit = other
     report.gravity = fit
+    if fit.is_negated:
+        report.blame(
+            "sign",
+            "the accelerometer has the wrong sign: at rest it must point up, as a force does; "
+            "multiply its columns by -1",
+        )
+        return
     if _axes_differ(fit):
-        if np.array_equal(fit.best_axes, -np.eye(3)):
-            report.blame(
-                "sign",
-                "the accelerometer has the wrong sign: at rest it must point up, as a force does; "
-                "multiply its columns by -1",
-            )
-        else:
-            report.blame(
-                "axes",
-                "the axes of the accelerometer are exchanged or have wrong signs: it fits with "
-                f"{axes_text(fit.best_axes)}; correct these columns of the samples",
-            )
+        report.blame(
+            "axes",
+            "the axes of the accelerometer are exchanged or have wrong signs: it fits with "
+            f"{axes_text(fit.best_axes)}; correct these columns of the samples",
+        )
         return
     report.notes.append(
         f"gravity along the path: {fit.magnitude:.2f} m/s^2, {fit.misfit * 1e3:.0f} mm left over; "
         f"one unit of the path is {fit.scale:.3f} m (+/- {fit.scale_deviation:.3f})"
     )
     certain = fit.misfit < 0.05
-    if certain and abs(fit.magnitude / streams.GRAVITY - 1) > _SMALL_SCALE:
+    off = fit.magnitude / streams.GRAVITY - 1
+    if not certain or abs(off) < _SMALL_SCALE:
+        return
+    usually = streams.usual_length(t, accel) / streams.GRAVITY - 1
+    if usually * np.sign(off) > _UNUSUAL:
         report.blame(
             "scale",
             f"gravity comes out as {fit.magnitude:.2f} m/s^2; correct the scale or the bias of the "
             "accelerometer",
         )
+        return
+    report.open_questions.append(
+        f"gravity along the path comes out as {fit.magnitude:.2f} m/s^2, but the accelerometer "
+        "usually reads 9.8: the path may be wrong, as where most of the scene moves"
+    )
 
 
 def _axes_differ(fit: GravityFit) -> bool:

@@ -42,6 +42,8 @@ _SMALL_SCALE = 0.1
 _ODD_FORCE = (4.0, 30.0)
 #: Norm of the difference of two rotations that are 16 degrees apart.
 _SAME_AXES = 0.4
+#: Share of the samples at the end of the range, above which an axis is not compared.
+_CLIPPED = 0.01
 _READINGS = ("gyro", "accelerometer")
 
 
@@ -137,7 +139,7 @@ def _describe(report: ImuReport, samples: ImuSamples) -> None:
 def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray, FloatArray]:
     """Check the readings alone; returns the gyro as it is, and the accelerometer in m/s^2."""
     gyro, accel = samples.gyro, samples.accel
-    if streams.swapped(gyro, accel):
+    if streams.swapped(samples.timestamps, gyro, accel):
         report.blame(
             "swapped",
             "gyro and accelerometer are exchanged: the gyro's columns hold gravity; exchange the "
@@ -162,9 +164,8 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
                     "a larger range of the IMU, or move more gently",
                     n / len(values),
                 )
-    unit = streams.accel_unit(accel)
-    length = float(np.median(np.linalg.norm(accel, axis=1)))
-    if unit == "g":
+    length = streams.usual_length(samples.timestamps, accel)
+    if streams.accel_unit(length) == "g":
         report.blame(
             "g",
             f"the accelerometer reads {length:.3g} where gravity is 9.81 m/s^2: it is in g; "
@@ -195,7 +196,15 @@ def _check_following(report: ImuReport, rates: RateFit) -> bool:
         return True
     damaged = any(fault.kind in ("dead", "swapped") for fault in report.faults)
     gyro_turns = rates.gyro_rms > 0.15 and rates.gyro_rms > 3 * rates.camera_rms
-    if rates.camera_rms > 2 * _TURNING or gyro_turns:
+    camera_turns = rates.camera_rms > 2 * _TURNING
+    if camera_turns and rates.gyro_rms < _TURNING and not damaged:
+        report.open_questions.append(
+            f"the images turn with {rates.camera_rms:.2f} rad/s, but the gyro is at rest: the "
+            "scene moves, or the samples are of another recording; record 10 s with turns about "
+            "all axes"
+        )
+        return False
+    if camera_turns or gyro_turns:
         if not damaged:
             report.blame(
                 "unrelated",
@@ -254,7 +263,7 @@ def _check_axes(
     report: ImuReport, rates: RateFit, settings: ImuSettings | None
 ) -> FloatArray | None:
     """Compare the rotation with that of the settings; returns ``T_ci`` for the accelerometer."""
-    if any(fault.kind == "dead" for fault in report.faults):
+    if _gyro_is_damaged(report):
         return None if settings is None else settings.T_ci
     mirrored = float(np.linalg.det(rates.M)) < 0 and _worse(rates, rates.R, rates.M)
     best = np.eye(4)
@@ -296,6 +305,15 @@ def _check_axes(
     return _other_axes(report, rates, settings, angle)
 
 
+def _gyro_is_damaged(report: ImuReport) -> bool:
+    """Whether the rates of single axes are wrong, so that no rotation fits."""
+    return any(
+        fault.kind == "dead"
+        or (fault.kind == "saturated" and "gyro" in fault.text and fault.share > _CLIPPED)
+        for fault in report.faults
+    )
+
+
 def _other_axes(
     report: ImuReport, rates: RateFit, settings: ImuSettings, angle: float
 ) -> FloatArray | None:
@@ -303,7 +321,7 @@ def _other_axes(
     P = min(signed_permutations(), key=lambda P: rates.misfit(R @ P))
     turned: FloatArray = settings.T_ci.copy()
     turned[:3, :3] = rates.R
-    if np.linalg.norm(R @ P - rates.M) < _SAME_AXES:
+    if not np.array_equal(P, np.eye(3)) and np.linalg.norm(R @ P - rates.M) < _SAME_AXES:
         text = (
             f"the axes of the gyro are exchanged or have wrong signs: it fits with {axes_text(P)}"
         )

@@ -23,6 +23,11 @@ from orbslam2py.trajectory.rotations import quaternions_from_rotations, rotation
 _PART = 2.0
 #: Expected bias of an accelerometer [m/s^2], and of a point of the path [m].
 _BIAS, _POINT = 0.1, 0.01
+#: Errors of poses are common to so many seconds. In units of their variance, the sum of squares by
+#: which one sign of the readings must fit better than the other.
+_COMMON, _CERTAIN = 0.5, 15.0
+#: Factor on the misfit of the best axes, up to which others are as good.
+_NEAR_BEST = 1.1
 #: Shorter paths [s] do not tell gravity from motion.
 _SHORTEST = 1.5
 
@@ -46,6 +51,8 @@ class GravityFit:
         ``best_axes @ reading``; and what is left with it [m].
     negated_misfit
         What is left with all readings negated [m].
+    seconds
+        Length of the path.
     up
         Force without the bias in the world, (n, 3), m/s^2, for a plot, at the times `t`.
     t
@@ -60,6 +67,7 @@ class GravityFit:
     best_axes: FloatArray
     best_misfit: float
     negated_misfit: float
+    seconds: float
     up: FloatArray
     t: FloatArray
 
@@ -67,6 +75,21 @@ class GravityFit:
     def magnitude(self) -> float:
         """Length of gravity, m/s^2."""
         return float(np.linalg.norm(self.gravity))
+
+    @property
+    def knows_sign(self) -> bool:
+        """Whether the readings fit clearly better than with the opposite sign."""
+        return self._is_worse(self.negated_misfit, self.misfit)
+
+    @property
+    def is_negated(self) -> bool:
+        """Whether they fit clearly worse than with the opposite sign, and no other axes better."""
+        is_best = self.negated_misfit < _NEAR_BEST * self.best_misfit
+        return is_best and self._is_worse(self.misfit, self.negated_misfit)
+
+    def _is_worse(self, misfit: float, other: float) -> bool:
+        n = 3 * self.seconds / _COMMON
+        return (misfit / max(other, 1e-9)) ** 2 - 1 > _CERTAIN / n
 
 
 def fit_gravity(
@@ -127,6 +150,7 @@ def fit_gravity(
         best_axes=all_axes[best],
         best_misfit=float(misfit[best]),
         negated_misfit=float(misfit[_negated(all_axes)]),
+        seconds=float(np.ptp(at)),
         up=np.einsum("nki,ni->nk", R_wb, accel - x[3:6]),
         t=t,
     )

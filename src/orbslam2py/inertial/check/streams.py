@@ -11,6 +11,8 @@ _AXES = "xyz"
 GRAVITY = 9.81  # m/s^2
 #: Length of the specific force [m/s^2] that is gravity by its size, also in motion.
 _NEAR_GRAVITY = (7.0, 13.0)
+#: Readings are averaged over so many seconds.
+_SPAN = 0.5
 #: Samples without any change, from which on an axis is dead.
 _DEAD = 20
 #: Samples in a row at the largest value, from which on it may be the end of the range.
@@ -19,10 +21,28 @@ _FLAT = 4
 _STEEP = 3e-3
 
 
-def swapped(gyro: FloatArray, accel: FloatArray) -> bool:
+def usual_length(t: FloatArray, readings: FloatArray) -> float:
+    """Return the median length of means over half a second of readings (n, 3) at seconds (n,).
+
+    Shaking has a mean near zero: what remains of the specific force is gravity.
+    """
+    if len(t) < 2:
+        return float(np.median(np.linalg.norm(readings, axis=1)))
+    steps = 0.5 * np.diff(t)[:, None] * (readings[1:] + readings[:-1])
+    integral = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    span = min(_SPAN, float(t[-1] - t[0]))
+    begin = t[t <= t[-1] - span + 1e-9]
+    first, last = (
+        np.column_stack([np.interp(at, t, one) for one in integral.T])
+        for at in (begin, begin + span)
+    )
+    return float(np.median(np.linalg.norm(last - first, axis=1))) / span
+
+
+def swapped(t: FloatArray, gyro: FloatArray, accel: FloatArray) -> bool:
     """Whether the readings (n, 3) of the gyro are those of the accelerometer and the reverse."""
     low, high = _NEAR_GRAVITY
-    g, a = (float(np.median(np.linalg.norm(one, axis=1))) for one in (gyro, accel))
+    g, a = usual_length(t, gyro), usual_length(t, accel)
     steady = _steadiness(accel) > _steadiness(gyro)
     # Beside a gyro that turns with 10 degrees/s, gravity of 1 g is there, steadier than the gyro.
     return low < g < high and a < 5 and not (0.7 < a < 1.3 and steady)
@@ -66,9 +86,8 @@ def saturated(axis: FloatArray) -> FloatArray:
     return np.asarray(found)
 
 
-def accel_unit(accel: FloatArray) -> str:
-    """Tell the unit of an accelerometer by the usual length: ``m/s^2``, ``g`` or empty."""
-    length = float(np.median(np.linalg.norm(accel, axis=1)))
+def accel_unit(length: float) -> str:
+    """Tell the unit of an accelerometer by its `usual_length`: ``m/s^2``, ``g`` or empty."""
     if _NEAR_GRAVITY[0] < length < _NEAR_GRAVITY[1]:
         return "m/s^2"
     return "g" if _NEAR_GRAVITY[0] < length * GRAVITY < _NEAR_GRAVITY[1] else ""

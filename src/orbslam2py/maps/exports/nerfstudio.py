@@ -27,8 +27,8 @@ from orbslam2py.maps.exports.images import (
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.units import unit_of
 
-#: From the map's world (y down) to one whose z points up; the same transform that nerfstudio
-#: applies to models of COLMAP.
+#: From the world (y down) of a map without an IMU to one whose z points up; the same transform that
+#: nerfstudio applies to models of COLMAP.
 _UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0, 0, 0, 1]])
 
 #: From OpenGL's camera (y up, looking along -z) to OpenCV's (y down, looking along +z).
@@ -107,7 +107,7 @@ def export_nerfstudio(
             stream.write(json.dumps(_transforms(contents, views, below), indent=2) + "\n")
         write_ply(
             made / _POINTS,
-            contents.points.positions @ _UP[:3, :3].T,
+            contents.points.positions @ _to_upright(contents)[:3, :3].T,
             colours=contents.point_colours(),
             unit=unit_of(contents),
             frame="world of transforms.json: z up",
@@ -115,7 +115,8 @@ def export_nerfstudio(
 
 
 def _transforms(contents: MapContents, views: list[View], below: str) -> dict[str, Any]:
-    poses = camera_to_world(contents.keyframes.T_wc)
+    T_up = _to_upright(contents)
+    poses = camera_to_world(contents.keyframes.T_wc, T_up)
     frames: list[dict[str, Any]] = []
     cameras = [_camera(contents, view) for view in views]
     # What all images share stands once, as in files of a single camera.
@@ -131,14 +132,20 @@ def _transforms(contents: MapContents, views: list[View], below: str) -> dict[st
         "camera_model": "OPENCV",
         **shared,
         "ply_file_path": _POINTS,
-        "applied_transform": _UP[:3].tolist(),
+        "applied_transform": T_up[:3].tolist(),
         "frames": frames,
     }
 
 
-def camera_to_world(T_wc: FloatArray) -> FloatArray:
+def camera_to_world(T_wc: FloatArray, T_up: FloatArray = _UP) -> FloatArray:
     """Convert poses (k, 4, 4) from OpenCV's axes to nerfstudio's, in the world with z up."""
-    return np.asarray(_UP @ T_wc @ _OPENGL)
+    return np.asarray(T_up @ T_wc @ _OPENGL)
+
+
+def _to_upright(contents: MapContents) -> FloatArray:
+    """Return the transform (4, 4) to the world with z up; an IMU may have turned the map so."""
+    roots = contents.keyframes.ids[contents.keyframes.parent < 0].tolist()
+    return np.eye(4) if {*roots} <= {*contents.upright_roots} else _UP
 
 
 def _camera(contents: MapContents, view: View) -> dict[str, float | str]:

@@ -7,7 +7,7 @@ import csv
 import json
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from orbslam2py.runs.result import empty_trajectory
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingState
 from orbslam2py.trajectory import Trajectory, read_tum
+from orbslam2py.trajectory.level import level_frame, moved
 
 #: What a frame of a run may be, as `FrameRow.state` tells it.
 _STATES = frozenset([*TrackingState.__members__, "SKIPPED", "DROPPED"])
@@ -67,7 +68,11 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class RunFolder:
-    """A run from its files."""
+    """A run from its files, for drawing.
+
+    Positions have the axes of the first keyframe: right, down, forward. Those of maps that an IMU
+    has turned upright are turned to level axes (`level_frame`).
+    """
 
     folder: Path
     report: dict[str, Any]
@@ -85,11 +90,13 @@ class RunFolder:
     """JPEG images of some frames by their number in the sequence."""
     places: list[Path]
     """Folders to search for the files; each file is read from the first that has it."""
+    to_axes: FloatArray = field(default_factory=lambda: np.eye(4))
+    """Transform (4, 4) from the world of the files of the main map."""
 
     @cached_property
     def online(self) -> Trajectory:
         """The trajectory at the time of tracking, without gaps."""
-        return _read_path(self.places, "trajectory_online.txt")
+        return _turned(_read_path(self.places, "trajectory_online.txt"), self.to_axes)
 
     @cached_property
     def map(self) -> MapArrays | None:
@@ -101,7 +108,7 @@ class RunFolder:
             If it is not whole.
         """
         file = _find(self.places, "map.npz")
-        return None if file is None else MapArrays.load(file)
+        return None if file is None else MapArrays.load(file).moved(self.to_axes)
 
     @property
     def sensor(self) -> Sensor:
@@ -162,8 +169,9 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         for file in place.glob("trajectory_map*.txt")
         if file.stem.removeprefix("trajectory_map").isdecimal()
     }
+    upright = {entry["map"] for entry in report.get("maps", []) if entry.get("upright")}
     others = {
-        number: read_tum(file)
+        number: _in_axes(read_tum(file), is_upright=number in upright)
         for number in sorted(numbers)
         if (file := _find(places, f"trajectory_map{number}.txt")) is not None
     }
@@ -175,18 +183,31 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         _check_number(path_file, len(path), "pose", _poses_of_main_map(report))
     points = _find(places, "points.ply")
     truth = _find(places, "groundtruth_aligned.txt")
+    keyframes = _read_path(places, "keyframes.txt")
+    T = np.eye(4)
+    if report.get("main_map") in upright and len(keyframes):
+        T = level_frame(keyframes.T_wc[0])
     return RunFolder(
         folder=places[0],
         report=report,
         frames=frames,
-        path=path,
+        path=_turned(path, T),
         others=others,
-        keyframes=_read_path(places, "keyframes.txt"),
-        truth=None if truth is None else read_tum(truth),
-        points=np.zeros((0, 3)) if points is None else read_points(points),
+        keyframes=_turned(keyframes, T),
+        truth=None if truth is None else _turned(read_tum(truth), T),
+        points=np.zeros((0, 3)) if points is None else moved(T, read_points(points)),
         images=_read_images(_find(places, "frame_images.zip")),
         places=places,
+        to_axes=T,
     )
+
+
+def _in_axes(path: Trajectory, *, is_upright: bool) -> Trajectory:
+    return _turned(path, level_frame(path.T_wc[0])) if is_upright and len(path) else path
+
+
+def _turned(path: Trajectory, T: FloatArray) -> Trajectory:
+    return Trajectory(path.timestamps, T @ path.T_wc, path.lost, path.indices)
 
 
 def _check_number(file: Path, found: int, noun: str, told: Any) -> None:

@@ -18,12 +18,13 @@ from orbslam2py.runs.report import maps_entry
 from orbslam2py.runs.result import RunResult, empty_snapshot
 from orbslam2py.runs.timeline import gaps_in_time
 from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.level import level_frame, moved
 from orbslam2py.trajectory.rotations import inverse_poses
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnMap:
-    """One map, in the frame of its first keyframe."""
+    """One map, in the axes of its first keyframe; an upright map in level ones."""
 
     number: int
     state: str
@@ -77,24 +78,30 @@ def map_of_file(saved: SavedMap, number: int) -> DrawnMap:
     paths = [saved.trajectory(run) for run in range(len(saved.runs))]
     paths = [one.select(~one.lost) for one in paths if not one.lost.all()]
     if not paths:
-        paths = [Trajectory(keyframes.timestamps, keyframes.T_cw[0] @ keyframes.T_wc)]
+        paths = [Trajectory(keyframes.timestamps, contents.anchor() @ keyframes.T_wc)]
     snapshot = MapSnapshot(
         keyframes.ids, keyframes.timestamps, keyframes.T_wc,
         points.ids, points.positions, contents.loop_edges,
+        is_upright=len(contents.upright_roots) > 0,
     )  # fmt: skip
     return _drawn(number, "", paths, snapshot)
 
 
 def _drawn(number: int, state: str, paths: Sequence[Trajectory], snapshot: MapSnapshot) -> DrawnMap:
-    T_0w = inverse_poses(snapshot.keyframe_T_wc[0]) if len(snapshot.keyframe_ids) else np.eye(4)
-    centres = _moved(T_0w, snapshot.keyframe_T_wc[:, :3, 3])
+    # From the world of paths, and from that of the map.
+    T_d0 = T_dw = np.eye(4)
+    if snapshot.is_upright:
+        T_d0 = T_dw = level_frame(snapshot.keyframe_T_wc[0])
+    elif len(snapshot.keyframe_ids):
+        T_dw = inverse_poses(snapshot.keyframe_T_wc[0])
+    centres = moved(T_dw, snapshot.keyframe_T_wc[:, :3, 3])
     return DrawnMap(
         number=number,
         state=state,
-        positions=np.concatenate([path.positions for path in paths]),
+        positions=moved(T_d0, np.concatenate([path.positions for path in paths])),
         gaps=np.concatenate([_gaps(path, first=k == 0) for k, path in enumerate(paths)]),
         keyframes=centres,
-        points=_moved(T_0w, snapshot.point_positions),
+        points=moved(T_dw, snapshot.point_positions),
         loops=centres[np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)],
     )
 
@@ -109,7 +116,3 @@ def _gaps(path: Trajectory, *, first: bool) -> npt.NDArray[np.bool_]:
 def _missing(indices: IntArray) -> npt.NDArray[np.bool_]:
     """Return whether lost frames are left out between two."""
     return np.asarray(np.diff(indices) > 1)
-
-
-def _moved(T: FloatArray, positions: FloatArray) -> FloatArray:
-    return np.asarray(positions @ T[:3, :3].T + T[:3, 3])

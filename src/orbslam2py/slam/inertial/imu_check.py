@@ -29,7 +29,7 @@ _log = logging.getLogger(__name__)
 _FIRST, _STEP = 2.0, 0.5
 #: Tracked seconds between tests after this number of seconds with a fit, or without a verdict.
 _LATER_STEP, _FITTING, _PATIENCE = 2.0, 5.0, 8.0
-#: Tracked seconds after which an IMU that fits is not tested any more.
+#: Tracked seconds after which an IMU that fits, with a known time offset, is not tested any more.
 _ENOUGH = 20.0
 #: Seconds of samples and poses that are compared.
 _WINDOW = 10.0
@@ -39,10 +39,10 @@ _AGREEING = 2
 _REACH = 0.25
 #: Rates [rad/s], root mean square, from which on an axis without any change is dead.
 _MOVING = 0.08
-#: Largest standard deviation of the time offset [s] with which the IMU counts as tested.
-_KNOWN_OFFSET = 0.015
-#: Least ratio of the misfit with a negated accelerometer, with which its sign counts as tested.
-_KNOWN_SIGN = 1.4
+#: Largest standard deviation of the time offset [s] with which the IMU counts as tested: slow
+#: motion does not show it, and an error that does not show does no harm in it. The tests go on
+#: until it is known to the second value, because faster motion may follow.
+_USABLE_OFFSET, _KNOWN_OFFSET = 0.04, 0.015
 #: Share of the samples at the end of the range, above which the range is too small.
 _SATURATED = 0.01
 
@@ -165,7 +165,7 @@ class ImuCheck:
             later = self._tracked > (_FITTING if fits else _PATIENCE)
             self._next = self._tracked + (_LATER_STEP if later else _STEP)
             self._test()
-            if fits and self._tracked > _ENOUGH:
+            if fits and self._tracked > _ENOUGH and _knows_offset(self._report):
                 self._done = True
                 self._samples, self._poses = [], []
 
@@ -261,8 +261,12 @@ def _is_tested(report: ImuReport) -> bool:
     rates, gravity = report.rates, report.gravity
     if report.open_questions or rates is None or gravity is None:
         return False
-    knows_sign = gravity.negated_misfit > _KNOWN_SIGN * gravity.misfit
-    return knows_sign and rates.offset_deviation < _KNOWN_OFFSET
+    return gravity.knows_sign and rates.offset_deviation < _USABLE_OFFSET
+
+
+def _knows_offset(report: ImuReport | None) -> bool:
+    rates = None if report is None else report.rates
+    return rates is not None and rates.offset_deviation < _KNOWN_OFFSET
 
 
 def _moving(report: ImuReport, samples: FloatArray) -> bool:

@@ -24,6 +24,7 @@ from orbslam2py.slam.inertial.inertial_start import (
     with_drift,
 )
 from orbslam2py.slam.inertial.inertial_views import InertialViews
+from orbslam2py.slam.inertial.map_moves import MapMove
 from orbslam2py.slam.inertial_config import InertialConfig
 from orbslam2py.slam.records import (
     InertialState,
@@ -94,6 +95,8 @@ class InertialTracker:
         )
         #: None: the IMU has not started.
         self.filter: core.InertialFilter | None = None
+        #: Of all maps, also of earlier ones.
+        self.map_moves: list[MapMove] = []
         #: Seconds of the last image whose pose is its own.
         self.last_seen = -math.inf
         # Of the first image of those in a row that show enough, and that the IMU leads through.
@@ -447,6 +450,8 @@ class InertialTracker:
 
     def _move_map(self, state: State, up: core.Pose, scale: float) -> State:
         core.transform_map(self._map, self._map_index, scale, up)
+        until = state.motion.last.timestamp
+        self.map_moves.append(MapMove(self._map_index, until, scale, up))
         self._map.set_upright(self._map_index)
         return state.following(self._map)
 

@@ -226,7 +226,7 @@ class LivePage:
         told = self._ask("path")
         if not isinstance(told, PathNow):
             return
-        positions = self._in_world(told.positions)
+        positions = told.positions if told.in_world else self._in_world(told.positions)
         gaps = np.concatenate([[True], told.lost[:-1]]) if len(told.lost) else told.lost
         known = ~told.lost
         scene = self.page.scene

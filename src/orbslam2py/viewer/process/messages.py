@@ -33,7 +33,9 @@ class PathNow:
     timestamps: FloatArray
     """(n,) seconds."""
     positions: FloatArray
-    """(n, 3) relative to the first keyframe of the map."""
+    """(n, 3) relative to the first keyframe of the map; of an upright map, in its drawn world."""
+    in_world: bool
+    """Whether they are in the drawn world."""
     lost: npt.NDArray[np.bool_]
     """(n,) whether the position repeats the one before."""
     seconds: float
