@@ -491,7 +491,9 @@ def _make_inertial(
         idle=lambda: all(worker.idle for worker in workers),
         config=config,
     )
-    back_end.mapping.inertial = tracker.keyframes
+    if setup.sensor is not Sensor.RGBD:
+        # Where depths are measured, images alone determine keyframes better.
+        back_end.mapping.inertial = tracker.keyframes
     return tracker
 
 
