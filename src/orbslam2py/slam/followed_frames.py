@@ -67,15 +67,15 @@ class FollowedFrames:
             features are needed.
         """
         earlier = self._earlier
-        if earlier is None or state.is_lost or state.motion.velocity is None or state.is_scarce:
+        if earlier is None or state.is_lost or state.is_scarce or state.motion.velocity is None:
             return None
         if self._map.n_keyframes_of(self._map.active_map) < self._fewest_keyframes:
             return None
         state = state.following(self._map)
-        last, T_cl = state.motion.last, state.motion.predicted(timestamp)
-        if last.T_cw is None or T_cl is None or earlier.big_change != last.big_change:
+        last, velocity = state.motion.last, state.motion.velocity
+        if last.T_cw is None or velocity is None or earlier.big_change != last.big_change:
             return None
-        predicted = T_cl @ last.T_cw
+        predicted = velocity.over(timestamp - last.timestamp) @ last.T_cw
 
         def found_in(context: core.FrameContext, grey: ByteArray) -> core.FollowedPoints | None:
             points = core.follow_points(self._map, context, earlier, predicted, grey)
