@@ -105,12 +105,12 @@ def test_frames_are_followed_without_features(kind: Sensor) -> None:
     errors = []
     for changes in (FOLLOW, OFF):
         with new_system(kind, deterministic=True, config=changes) as system:
-            records = play(system, 60)
+            records = play(system, 80 if kind is Sensor.MONOCULAR else 40)
             assert all(record.T_cw is not None for record in records[20:])
         errors.append(ate(system))
         if changes is FOLLOW:
             followed = [record for record in records if record.method is PoseMethod.PATCHES]
-            assert len(followed) > 20
+            assert len(followed) > 15
             assert not any(record.is_keyframe for record in followed)
             assert "extract" not in followed[0].milliseconds
             assert all(record.covariance is not None for record in followed)
