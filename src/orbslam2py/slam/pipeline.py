@@ -63,6 +63,9 @@ _log = logging.getLogger(__name__)
 #: The year 5138 in seconds since 1970; today in milliseconds, or in what is finer, lies far beyond.
 _NO_SECONDS = 1e11
 
+#: More inliers than a frame has.
+_ALL_INLIERS = 1_000_000
+
 #: Keyframes after which the first frames of a map are estimated again, and frames at the latest.
 _SETTLED_MAP, _YOUNG_FRAMES = 10, 250
 
@@ -134,7 +137,7 @@ class Pipeline:
         )
         self.recorder = FrameRecorder(
             back_end.map,
-            FrameReestimation(back_end.map, _make_search(setup, back_end, config)),
+            FrameReestimation(back_end.map, _make_search(setup, back_end, _aligning_all(config))),
             every_frame=config.trajectory.rematch_every_frame,
         )
         self.statistics = StageStatistics()
@@ -461,6 +464,14 @@ class Pipeline:
 def _at_once(work: Callable[[], None]) -> None:
     """Do something now, where recorded images wait and results must be equal."""
     work()
+
+
+def _aligning_all(config: Config) -> Config:
+    """For frames that are matched again, when there is time to align all inliers."""
+    alignment = config.alignment
+    if alignment.tracked_inliers == 0:
+        return config
+    return replace(config, alignment=replace(alignment, tracked_inliers=_ALL_INLIERS))
 
 
 def _make_search(

@@ -279,7 +279,7 @@ def test_worst_places() -> None:
 
 #: Keys that are no single figure, or that the page tells elsewhere.
 ELSEWHERE = {
-    *("imu", "input"),
+    *("imu", "input", "alignment"),
     *("settings", "options", "command", "command_folder", "machine", "milliseconds", "losses"),
     *(
         "maps",
