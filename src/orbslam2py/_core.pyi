@@ -3604,17 +3604,16 @@ def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typi
     with `last`; temporary points left there are dropped first. Their ids start at
     FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
     """
-def align_frame(map: Map, frame: TrackedFrame, most: typing.SupportsInt | typing.SupportsIndex, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> typing.Annotated[list[int], "FixedSize(5)"]:
+def align_frame(map: Map, frame: TrackedFrame, most: typing.SupportsInt | typing.SupportsIndex) -> typing.Annotated[list[int], "FixedSize(5)"]:
     """
     Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the
     sightings tried by AlignmentFailure.
     """
-def align_keyframes(map: Map, keyframe: int, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, patches_only: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[int, typing.Annotated[list[int], "FixedSize(5)"]]:
+def align_keyframes(map: Map, keyframe: int, patches_only: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[int, typing.Annotated[list[int], "FixedSize(5)"]]:
     """
     Align sightings to the patches of their points, in a new keyframe and in its neighbours
-    that keep their images; cut the patches that are missing. `noise`: standard deviation of an
-    aligned sighting over that of a corner; 0: as patches and adjustments say. Returns (number of new patches,
-    sightings tried by AlignmentFailure).
+    that keep their images; cut the patches that are missing. Returns
+    (number of new patches, sightings tried by AlignmentFailure).
     """
 def align_patch(reference: numpy.ndarray, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], A: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 2]"], image: numpy.ndarray, start: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[2, 1]"], options: AlignmentOptions = ...) -> PatchAlignment:
     """
@@ -3656,7 +3655,7 @@ def assess_drift(map: Map, loop: Loop, fix_scale: bool) -> LoopDrift:
     """
     Compare a loop's correction with what drift can explain. Returns a LoopDrift.
     """
-def associate_followed(map: Map, frame: TrackedFrame, followed: FollowedPoints, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+def associate_followed(map: Map, frame: TrackedFrame, followed: FollowedPoints) -> None:
     """
     Associate a frame that was built of the features of these points with them, and give
     it their pose. Raises StateError for another frame, and where there is no pose.

@@ -176,7 +176,7 @@ void bind_followed_points(py::module_& module) {
       "Look for the inliers of an earlier frame in a grey image (h, w) uint8 by their patches,\n"
       "around the predicted pose. Raises ImageError for anything but a grey image.");
   module.def(
-      "associate_followed", &associate, "map"_a, "frame"_a, "followed"_a, "noise"_a = 0.0,
+      "associate_followed", &associate, "map"_a, "frame"_a, "followed"_a,
       "Associate a frame that was built of the features of these points with them, and give\n"
       "it their pose. Raises StateError for another frame, and where there is no pose.");
 }
@@ -184,20 +184,15 @@ void bind_followed_points(py::module_& module) {
 void bind_map_alignment(py::module_& module) {
   module.def(
       "align_keyframes",
-      [](Map& map, KeyFrameId keyframe, double noise, bool patches_only, int n_threads) {
-        const KeyframeAlignment done =
-            align_keyframes(map, keyframe, noise, patches_only, n_threads);
+      [](Map& map, KeyFrameId keyframe, bool patches_only, int n_threads) {
+        const KeyframeAlignment done = align_keyframes(map, keyframe, patches_only, n_threads);
         return std::make_pair(done.n_patches, done.counts);
       },
-      "map"_a, "keyframe"_a, "noise"_a = 0.0, "patches_only"_a = false, "n_threads"_a = 1,
-      Release(),
+      "map"_a, "keyframe"_a, "patches_only"_a = false, "n_threads"_a = 1, Release(),
       "Align sightings to the patches of their points, in a new keyframe and in its neighbours\n"
-      "that keep their images; cut the patches that are missing. `noise`: standard deviation of "
-      "an\n"
-      "aligned sighting over that of a corner; 0: as patches and adjustments say. Returns (number "
-      "of new patches,\n"
-      "sightings tried by AlignmentFailure).");
-  module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, "noise"_a = 0.0, Release(),
+      "that keep their images; cut the patches that are missing. Returns\n"
+      "(number of new patches, sightings tried by AlignmentFailure).");
+  module.def("align_frame", &align_frame, "map"_a, "frame"_a, "most"_a, Release(),
              "Align at most `most` inliers of a tracked frame for optimize_pose(). Returns the\n"
              "sightings tried by AlignmentFailure.");
   bind_followed_points(module);
@@ -207,7 +202,7 @@ void bind_map_alignment(py::module_& module) {
         PoseEstimate estimate;
         {
           const py::gil_scoped_release release;
-          estimate = optimize_aligned(map, frame, most, 0, fewest);
+          estimate = optimize_aligned(map, frame, most, fewest);
         }
         return std::make_tuple(estimate.n_inliers, frame.n_associated(), frame.n_map_inliers(),
                                estimate.covariance);

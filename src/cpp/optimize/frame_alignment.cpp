@@ -42,25 +42,20 @@ std::vector<Sighting> sightings_of(const Map& map, const TrackedFrame& frame, st
 
 }  // namespace
 
-AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most, double noise) {
+AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most) {
   AlignmentCounts counts{};
   const Frame& f = *frame.frame;
   const auto images = f.images ? f.images->get() : nullptr;
   if (!images || !frame.T_cw) return counts;
   const std::vector<Sighting> sightings = sightings_of(map, frame, most);
   frame.aligned.assign(f.size(), AlignedPixel());
-  const auto assumed = static_cast<float>(1 / (noise * noise));
-  const float weight = noise > 0 ? assumed : map.noise().position.weight();
-  const float right_weight = noise > 0 ? assumed : map.noise().right.weight();
+  const float weight = map.noise().position.weight();
+  const float right_weight = map.noise().right.weight();
   for (const Sighting& s : sightings) {
-    const PointPatch& patch = *s.patch;
-    const double z = (s.T_rw * frame.positions[s.slot]).z();
-    const auto surface =
-        parallel_patch(*patch.camera, s.T_rw.inverse(), patch.pixel.cast<double>(), z);
-    if (!surface) continue;
+    const auto placed = place_patch(*s.patch, s.T_rw, frame.positions[s.slot]);
+    if (!placed) continue;
     const FoundPatch found =
-        find_patch({&patch.patch, patch.camera.get(), patch.scales.get(), patch.level, *surface}, f,
-                   *frame.T_cw, images->left, raw_pixel(f, s.slot));
+        find_patch(*placed, f, *frame.T_cw, images->left, raw_pixel(f, s.slot));
     ++counts[static_cast<std::size_t>(found.failure)];
     if (!found.ok()) continue;
     const Keypoint& keypoint = f.keypoints[s.slot];
@@ -76,11 +71,10 @@ AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t mos
   return counts;
 }
 
-PoseEstimate optimize_aligned(const Map& map, TrackedFrame& frame, std::size_t most, double noise,
-                              int fewest) {
+PoseEstimate optimize_aligned(const Map& map, TrackedFrame& frame, std::size_t most, int fewest) {
   PoseEstimate estimate = optimize_pose(frame);
   if (most == 0 || estimate.n_inliers < fewest) return estimate;
-  align_frame(map, frame, most, noise);
+  align_frame(map, frame, most);
   return optimize_pose(frame);
 }
 

@@ -11,14 +11,12 @@ namespace orbslam {
 /// Aligns the inliers of a tracked frame to the patches of their points, at most `most` of them,
 /// spread evenly over the keypoints: fills TrackedFrame::aligned for optimize_pose(). The frame
 /// must have a pose and its images; otherwise nothing is done. Takes the read lock for a short
-/// section. `noise`: as for align_keyframes(). Returns counts by result. See
+/// section. Returns counts by result. See
 /// docs/method/alignment.md#tracked-frames.
-AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most,
-                            double noise = 0);
+AlignmentCounts align_frame(const Map& map, TrackedFrame& frame, std::size_t most);
 
 /// optimize_pose(), and once more with aligned inliers (align_frame) where `most` is not 0 and the
 /// pose has at least `fewest` inliers.
-PoseEstimate optimize_aligned(const Map& map, TrackedFrame& frame, std::size_t most, double noise,
-                              int fewest);
+PoseEstimate optimize_aligned(const Map& map, TrackedFrame& frame, std::size_t most, int fewest);
 
 }  // namespace orbslam

@@ -49,7 +49,7 @@ struct Point {
   std::shared_ptr<const PointPatch> patch;
   Pose T_rw;  ///< of the patch's keyframe
   bool is_new = false;
-  std::optional<SurfacePatch> surface;
+  std::optional<PlacedPatch> placed;
 };
 
 /// What the map holds of the sightings to be aligned.
@@ -139,12 +139,10 @@ void cut_missing_patches(Task& task) {
 
 void align_one(const Task& task, Sighting& sighting) {
   const Point& point = task.points[sighting.point];
-  if (!point.surface) return;
+  if (!point.placed) return;
   const View& view = task.views[sighting.view];
   const Frame& frame = *view.frame;
   const PointPatch& patch = *point.patch;
-  const PlacedPatch placed{&patch.patch, patch.camera.get(), patch.scales.get(), patch.level,
-                           *point.surface};
   const Keypoint& keypoint = frame.keypoints[sighting.slot];
   AlignedSighting& result = sighting.result;
   result.point = point.id;
@@ -157,8 +155,8 @@ void align_one(const Task& task, Sighting& sighting) {
     result.variance =
         static_cast<float>(kLeastAlignedVariance) * frame.scales->sigma2(keypoint.level);
   } else {
-    const FoundPatch found =
-        find_patch(placed, frame, view.T_cw, view.images->left, raw_pixel(frame, sighting.slot));
+    const FoundPatch found = find_patch(*point.placed, frame, view.T_cw, view.images->left,
+                                        raw_pixel(frame, sighting.slot));
     sighting.failure = found.failure;
     if (!found.ok()) return;
     result.u = found.u;
@@ -201,18 +199,13 @@ void follow(NoiseFactor& noise, double factor) {
 
 }  // namespace
 
-KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bool patches_only,
-                                  int n_threads) {
+KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_only, int n_threads) {
   KeyframeAlignment result;
-  if (noise > 0) {
-    map.noise().position.assume(noise);
-    map.noise().right.assume(noise);
-  }
   Task task = gather(map, current);
   if (task.sightings.empty()) return result;
   const auto& depth = task.views.front().frame->depth;
   const bool has_depths = std::any_of(depth.begin(), depth.end(), [](float z) { return z > 0; });
-  if (has_depths && !(noise > 0) && map.noise().position.n_measured() == 0) {
+  if (has_depths && map.noise().position.n_measured() == 0) {
     map.noise().position.assume(kFirstWithDepths);
   }
   cut_missing_patches(task);
@@ -220,9 +213,7 @@ KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise, bo
   if (!patches_only) {
     for (Point& point : task.points) {
       if (!point.patch) continue;
-      const double z = (point.T_rw * point.position).z();
-      point.surface = parallel_patch(*point.patch->camera, point.T_rw.inverse(),
-                                     point.patch->pixel.cast<double>(), z);
+      point.placed = place_patch(*point.patch, point.T_rw, point.position);
     }
     const std::size_t n = task.sightings.size();
     for_each_in_parallel((n + kChunk - 1) / kChunk, static_cast<std::size_t>(n_threads),

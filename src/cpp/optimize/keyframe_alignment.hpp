@@ -13,13 +13,12 @@ struct KeyframeAlignment {
 
 /// Aligns sightings to the patches of their points, in a new keyframe and in those of its
 /// neighbours that still have their images: each sighting once. A point without a patch gets that
-/// of its youngest sighting in these keyframes. With `patches_only` nothing is aligned. `noise`:
-/// standard deviation of an aligned sighting over that of a corner; 0: as patches and adjustments
-/// say. Reads and writes under the locks of the map, aligns without; a sighting that has gone
+/// of its youngest sighting in these keyframes. With `patches_only` nothing is aligned. Reads
+/// and writes under the locks of the map, aligns without; a sighting that has gone
 /// meanwhile is ignored. A keyframe that is dead gives an empty result. See
 /// docs/method/alignment.md#new-keyframes.
-KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, double noise = 0,
-                                  bool patches_only = false, int n_threads = 1);
+KeyframeAlignment align_keyframes(Map& map, KeyFrameId current, bool patches_only = false,
+                                  int n_threads = 1);
 
 /// Lets the noise factors of the map follow what an adjustment left over of its aligned sightings.
 /// `bundle` is solved. Takes no lock.

@@ -20,6 +20,14 @@ Eigen::Vector2d to_level(const LevelPlacement& place, const Eigen::Vector2f& pix
 
 }  // namespace
 
+std::optional<PlacedPatch> place_patch(const PointPatch& patch, const Pose& T_rw,
+                                       const Eigen::Vector3d& position) {
+  const auto surface = parallel_patch(*patch.camera, T_rw.inverse(), patch.pixel.cast<double>(),
+                                      (T_rw * position).z());
+  if (!surface) return std::nullopt;
+  return PlacedPatch{&patch.patch, patch.camera.get(), patch.scales.get(), patch.level, *surface};
+}
+
 FoundPatch find_patch(const PlacedPatch& placed, const Frame& frame, const Pose& T_cw,
                       const ImagePyramid& images, const Eigen::Vector2f& start,
                       const AlignmentOptions& options, int coarser) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "alignment/align_patch.hpp"
 #include "alignment/patch_warp.hpp"
@@ -30,6 +31,11 @@ struct FoundPatch {
 
   bool ok() const { return failure == AlignmentFailure::kNone; }
 };
+
+/// The patch of a point at `position`, on the surface that its reference camera at `T_rw` sees. It
+/// refers to `patch`. None when the point is not in front of that camera.
+std::optional<PlacedPatch> place_patch(const PointPatch& patch, const Pose& T_rw,
+                                       const Eigen::Vector3d& position);
 
 /// Warps a patch into an image of `frame`, seen from `T_cw`, and aligns it from the raw pixel
 /// `start` on, `coarser` levels above the one that shows it as large as the reference. Nothing is

@@ -23,8 +23,8 @@ struct Source {
   Eigen::Vector3d position;
   Descriptor descriptor;
   std::shared_ptr<const PointPatch> patch;
-  SurfacePatch surface;
-  float angle = 0;  ///< of the keypoint in the earlier frame
+  PlacedPatch placed;  ///< refers to the patch
+  float angle = 0;     ///< of the keypoint in the earlier frame
 };
 
 struct Found {
@@ -40,14 +40,11 @@ std::vector<Source> sources_of(const Map& map, const TrackedFrame& earlier) {
     if (!earlier.map_points[i].valid() || earlier.outlier[i] != 0) continue;
     const MapPoint* point = map.find(earlier.map_points[i]);
     if (point == nullptr || !point->patch) continue;
-    const PointPatch& patch = *point->patch;
-    const auto [pose, is_new] = poses.try_emplace(patch.keyframe);
-    if (is_new) pose->second = map.T_cw(patch.keyframe);
-    const double z = (pose->second * point->position).z();
-    const auto surface =
-        parallel_patch(*patch.camera, pose->second.inverse(), patch.pixel.cast<double>(), z);
-    if (!surface) continue;
-    sources.push_back({point->id, point->position, point->descriptor, point->patch, *surface,
+    const auto [pose, is_new] = poses.try_emplace(point->patch->keyframe);
+    if (is_new) pose->second = map.T_cw(point->patch->keyframe);
+    const auto placed = place_patch(*point->patch, pose->second, point->position);
+    if (!placed) continue;
+    sources.push_back({point->id, point->position, point->descriptor, point->patch, *placed,
                        earlier.frame->keypoints[i].angle});
   }
   return sources;
@@ -65,7 +62,7 @@ std::size_t count_in_view(const std::vector<Source>& sources, const Camera& came
                           const Pose& T_cw) {
   const ImageSize size = camera.image_size();
   return static_cast<std::size_t>(std::count_if(sources.begin(), sources.end(), [&](const auto& s) {
-    const auto warp = warp_of(s.surface, camera, T_cw);
+    const auto warp = warp_of(s.placed.surface, camera, T_cw);
     return warp && warp->pixel.x() >= 0 && warp->pixel.y() >= 0 && warp->pixel.x() < size.width &&
            warp->pixel.y() < size.height;
   }));
@@ -79,12 +76,10 @@ std::vector<Found> find_all(const std::vector<Source>& sources, std::size_t step
   found.reserve(sources.size() / step + 1);
   for (std::size_t i = 0; i < sources.size(); i += step) {
     const Source& s = sources[i];
-    const auto warp = warp_of(s.surface, *image.camera, T_cw);
+    const auto warp = warp_of(s.placed.surface, *image.camera, T_cw);
     if (!warp) continue;
-    const PointPatch& patch = *s.patch;
     const FoundPatch place =
-        find_patch({&patch.patch, patch.camera.get(), patch.scales.get(), patch.level, s.surface},
-                   image, T_cw, pyramid, warp->pixel.cast<float>(), options, coarser);
+        find_patch(s.placed, image, T_cw, pyramid, warp->pixel.cast<float>(), options, coarser);
     if (place.ok()) found.push_back({&s, place});
   }
   return found;
@@ -145,13 +140,12 @@ FollowedPoints follow_points(const Map& map, const FrameContext& context,
   return followed;
 }
 
-void associate(const Map& map, TrackedFrame& frame, const FollowedPoints& followed, double noise) {
+void associate(const Map& map, TrackedFrame& frame, const FollowedPoints& followed) {
   const Frame& f = *frame.frame;
   if (f.size() != followed.points.size() || !followed.T_cw) {
     throw StateError("the frame was not built of the points that were followed");
   }
-  const double factor = noise > 0 ? noise : map.noise().position.value();
-  const auto weight = static_cast<float>(1 / (factor * factor));
+  const float weight = map.noise().position.weight();
   frame.T_cw = followed.T_cw;
   frame.aligned.assign(f.size(), AlignedPixel());
   for (std::size_t i = 0; i < f.size(); ++i) {

@@ -33,9 +33,8 @@ FollowedPoints follow_points(const Map& map, const FrameContext& context,
                              const TrackedFrame& earlier, const Pose& T_cw, const cv::Mat& grey);
 
 /// Associates a frame that was built of these features with their points, with the noise of aligned
-/// sightings (`noise` as for align_frame()), and gives it their pose. Throws StateError when the
+/// sightings, and gives it their pose. Throws StateError when the
 /// frame has other keypoints, or the points have no pose.
-void associate(const Map& map, TrackedFrame& frame, const FollowedPoints& followed,
-               double noise = 0);
+void associate(const Map& map, TrackedFrame& frame, const FollowedPoints& followed);
 
 }  // namespace orbslam

@@ -75,7 +75,7 @@ TEST(AlignKeyframes, KeypointsStay) {
 
 TEST(AlignKeyframes, PatchesAloneMoveNothing) {
   Wall wall;
-  const KeyframeAlignment done = align_keyframes(wall.map, kNewest, 0, true);
+  const KeyframeAlignment done = align_keyframes(wall.map, kNewest, true);
   EXPECT_GT(done.n_patches, 0);
   EXPECT_EQ(done.counts, AlignmentCounts{});
   EXPECT_TRUE(wall.map.find(kNewest)->aligned.empty());
@@ -119,7 +119,7 @@ TEST(AlignKeyframes, LocalAdjustmentIsMoreExactWithIt) {
 TEST(AlignKeyframes, RepeatedRunsGiveTheSameBytes) {
   Wall first, second;
   for (Wall* wall : {&first, &second}) {
-    align_keyframes(wall->map, kNewest, 0.5, false, wall == &first ? 1 : 2);
+    align_keyframes(wall->map, kNewest, false, wall == &first ? 1 : 2);
     local_bundle_adjustment(wall->map, kNewest, nullptr);
   }
   EXPECT_EQ(first.largest_error(), second.largest_error());
@@ -142,7 +142,7 @@ TrackedFrame tracked(const Wall& wall) {
 
 TEST(AlignFrame, TakesTheWantedNumberOfInliers) {
   Wall wall;
-  align_keyframes(wall.map, KeyFrameId(0), 0, true);
+  align_keyframes(wall.map, KeyFrameId(0), true);
   TrackedFrame frame = tracked(wall);
   ASSERT_GT(frame.n_associated(), 40U);
   const AlignmentCounts counts = align_frame(wall.map, frame, 20);
@@ -158,38 +158,42 @@ TEST(AlignFrame, TakesTheWantedNumberOfInliers) {
 
 TEST(AlignFrame, NoInlierIsLost) {
   Wall wall;
-  align_keyframes(wall.map, KeyFrameId(0), 0, true);
+  align_keyframes(wall.map, KeyFrameId(0), true);
   TrackedFrame frame = tracked(wall);
   const int before = optimize_pose(frame).n_inliers;
-  align_frame(wall.map, frame, 1000, 0.1);
+  wall.map.noise().position.assume(0.1);
+  wall.map.noise().right.assume(0.1);
+  align_frame(wall.map, frame, 1000);
   EXPECT_GE(optimize_pose(frame).n_inliers, before - 2);
 }
 
 TEST(OptimizeAligned, OptimizesAgainWhereThePoseHasEnoughInliers) {
   Wall wall;
-  align_keyframes(wall.map, KeyFrameId(0), 0, true);
+  align_keyframes(wall.map, KeyFrameId(0), true);
   TrackedFrame by_hand = tracked(wall), aligned = tracked(wall), plain = tracked(wall);
   const int n = optimize_pose(by_hand).n_inliers;
   const Pose without = *by_hand.T_cw;
   align_frame(wall.map, by_hand, 200);
   const PoseEstimate expected = optimize_pose(by_hand);
 
-  const PoseEstimate estimate = optimize_aligned(wall.map, aligned, 200, 0, n);
+  const PoseEstimate estimate = optimize_aligned(wall.map, aligned, 200, n);
   EXPECT_EQ(estimate.n_inliers, expected.n_inliers);
   EXPECT_EQ(estimate.covariance, expected.covariance);
   EXPECT_EQ(aligned.T_cw->matrix(), by_hand.T_cw->matrix());
   EXPECT_NE(aligned.T_cw->matrix(), without.matrix());
 
-  EXPECT_EQ(optimize_aligned(wall.map, plain, 200, 0, n + 1).n_inliers, n);
+  EXPECT_EQ(optimize_aligned(wall.map, plain, 200, n + 1).n_inliers, n);
   EXPECT_EQ(plain.T_cw->matrix(), without.matrix());
   TrackedFrame none = tracked(wall);
-  optimize_aligned(wall.map, none, 0, 0, 0);
+  optimize_aligned(wall.map, none, 0, 0);
   EXPECT_EQ(none.T_cw->matrix(), without.matrix());
 }
 
 TEST(AlignKeyframes, TheAssumedNoiseGivesTheWeights) {
   Wall wall;
-  align_keyframes(wall.map, kNewest, 0.5);
+  align_keyframes(wall.map, kNewest);
+  wall.map.noise().position.assume(0.5);
+  wall.map.noise().right.assume(0.5);
   const GatheredBundle bundle = gather_full_bundle(wall.map);
   std::size_t n_aligned = 0;
   for (std::size_t i = 0; i < bundle.kinds.size(); ++i) {
