@@ -36,6 +36,7 @@ SWITCHES: dict[str, tuple[str, ...]] = {
     "frames": (*ON, *NO_KEYFRAMES),
     "both": ON,
     "all": (*ON, *RIGHT),
+    "followed": (*ON, "alignment.follow=true"),
 }
 RECORDED = [
     ("TUM desk", "tum_fr1_desk_rgb110", "mono"),

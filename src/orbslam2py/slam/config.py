@@ -414,7 +414,7 @@ PRESETS: Mapping[str, Mapping[str, float | int | bool]] = {
         "keyframes.share_monocular": 0.8,
     },
     # Features only where patches are not enough.
-    "light": {"alignment.follow": True, "alignment.monocular": True, "alignment.rgbd": True},
+    "light": {"alignment.follow": True, "alignment.monocular": True},
     "normal": {},
     "thorough": {"trajectory.rematch_every_frame": True},
 }

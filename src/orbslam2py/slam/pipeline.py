@@ -18,43 +18,28 @@ from orbslam2py import _core as core
 from orbslam2py._arguments import is_finite, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
-from orbslam2py._values import replace
 from orbslam2py.errors import ImageError
 from orbslam2py.maps.map_autosave import MapAutosave, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.acceptance.multi_hypothesis_search import MultiHypothesisSearch
-from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
-from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
-from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
-from orbslam2py.slam.followed_frames import FollowedFrames
 from orbslam2py.slam.frame_recorder import FrameRecorder
-from orbslam2py.slam.frame_reestimation import FrameReestimation
-from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput, InertialTracker
-from orbslam2py.slam.inertial_config import InertialConfig
-from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
-from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
+from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput
 from orbslam2py.slam.kept_images import KeptImages
-from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import Setup, SystemOptions
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.parts import make_inertial, make_reestimation, make_tracking
 from orbslam2py.slam.records import (
     Reason,
     TrackingRecord,
     TrackingResult,
     TrackingState,
 )
-from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.rig_front_end import RigFrontEnd, front_end_of
-from orbslam2py.slam.tracking import Tracking
 from orbslam2py.slam.watched_frame import (
     FrameWatcher,
     WatchedFrame,
-    accepted_keypoints,
     frame_features,
 )
 
@@ -63,11 +48,12 @@ _log = logging.getLogger(__name__)
 #: The year 5138 in seconds since 1970; today in milliseconds, or in what is finer, lies far beyond.
 _NO_SECONDS = 1e11
 
-#: More inliers than a frame has.
-_ALL_INLIERS = 1_000_000
-
 #: Keyframes after which the first frames of a map are estimated again, and frames at the latest.
 _SETTLED_MAP, _YOUNG_FRAMES = 10, 250
+
+
+#: The image; the right image, the depth, the images of a rig, or None; the mask.
+_GivenImages = tuple[ByteArray, Any, Any]
 
 
 class Pipeline:
@@ -117,17 +103,13 @@ class Pipeline:
             keep_images=alignment.uses_points,
             align_right=alignment.right_image,
         )
-        self._followed: FollowedFrames | None = None
         self._kept_images = KeptImages(every_frame=config.trajectory.rematch_every_frame)
         self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
         #: Uses the IMU in tracking; None without settings of one.
-        self.inertial_tracker = _make_inertial(setup, back_end, config.inertial)
-        self.tracking = _make_tracking(setup, back_end, options, config, self.inertial_tracker)
-        if alignment.follow and self.inertial_tracker is None:
-            assert isinstance(self.front_end, FrontEnd)
-            # A single camera's young map still changes its shape.
-            fewest = 0 if sensor.has_depth else _SETTLED_MAP
-            self._followed = FollowedFrames(back_end.map, self.front_end, fewest)
+        self.inertial_tracker = make_inertial(setup, back_end, config.inertial)
+        self.tracking = make_tracking(
+            setup, back_end, options, config, self.front_end, self.inertial_tracker
+        )
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(
             setup.imu, back_end.events.worker.offer if in_time else _at_once
@@ -137,7 +119,7 @@ class Pipeline:
         )
         self.recorder = FrameRecorder(
             back_end.map,
-            FrameReestimation(back_end.map, _make_search(setup, back_end, _aligning_all(config))),
+            make_reestimation(setup, back_end, config),
             every_frame=config.trajectory.rematch_every_frame,
         )
         self.statistics = StageStatistics()
@@ -218,42 +200,12 @@ class Pipeline:
         timer = StageTimer()
         state_before = tracking.state
         watchers = self.frame_watchers
-        details_wanted = details or bool(watchers)
-        followed = self._follow(timestamp, image, second, mask, timer)
-        if followed is not None:
-            frame, outcome = followed
-            if details_wanted:
-                outcome = replace(outcome, inliers=accepted_keypoints(frame))
-            interval = None
-        else:
-            with timer("track"):
-                # Features are found while mapping works: they do not depend on the map.
-                frame = core.TrackedFrame(
-                    self.build_frame(image, second, self._next_frame_id, timestamp, timer, mask)
-                )
-            if self.localization.on:
-                # Aligned points would pull frames towards the map while odometry still holds them.
-                core.release_images(frame.features)
-            if self._waits_for_mapping:
-                with timer("wait"):
-                    self._wait_for_mapping(frame)
-            self._look_again_at_start()
-            with timer("track"):
-                # From here on the image counts: every id is one image.
-                self._next_frame_id += 1
-                self._last_timestamp = timestamp
-                # The samples of the IMU from the image before to this one; None without an IMU.
-                interval = self._take_samples(timestamp)
-                outcome = tracking.track(
-                    frame,
-                    timer,
-                    localize=self.localization.on,
-                    details=details_wanted,
-                    interval=interval,
-                )
-            if self._followed is not None:
-                ok = outcome.state is TrackingState.OK and not outcome.estimate.unconfirmed
-                self._followed.note(frame if ok and frame.T_cw is not None else None)
+        images = image, second, mask
+        with_details = details or bool(watchers)
+        followed = self._follow(timestamp, images, timer, details=with_details)
+        frame, outcome, interval = followed or self._track(
+            timestamp, images, timer, details=with_details
+        )
         self.statistics.add(timer.milliseconds)
         self._kept_images.note(
             frame.features,
@@ -276,22 +228,53 @@ class Pipeline:
         return record
 
     def _follow(
-        self, timestamp: float, image: ByteArray, second: Any, mask: Any, timer: StageTimer
-    ) -> tuple[core.TrackedFrame, TrackingResult] | None:
-        """Track an image by the patches of known points; None where it needs features."""
-        if self._followed is None or mask is not None or self.localization.on:
+        self, timestamp: float, images: _GivenImages, timer: StageTimer, *, details: bool
+    ) -> tuple[core.TrackedFrame, TrackingResult, None] | None:
+        """Track images without features; return None where they are needed."""
+        image, depth, mask = images
+        usable = self.inertial_tracker is None and mask is None and not self.localization.on
+        if not (self.alignment.follow and usable):
             return None
         if self._waits_for_mapping:
             with timer("wait"):
                 self.back_end.mapping.worker.wait_until_idle(unless_held=True)
-        state = self.tracking.tracking_state
         with timer("track"):
-            found = self._followed.follow(image, second, self._next_frame_id, timestamp, state)
-            if found is None:
+            number = self._next_frame_id
+            followed = self.tracking.follow(image, depth, number, timestamp, details=details)
+            if followed is None:
                 return None
-            self._next_frame_id += 1
-            self._last_timestamp = timestamp
-            return found[0], self.tracking.take_followed(*found)
+            self._count(timestamp)
+            return *followed, None
+
+    def _track(
+        self, timestamp: float, images: _GivenImages, timer: StageTimer, *, details: bool
+    ) -> tuple[core.TrackedFrame, TrackingResult, ImuInterval | None]:
+        """Track images with features and, where there is one, an IMU."""
+        image, second, mask = images
+        with timer("track"):
+            # Features are found while mapping works: they do not depend on the map.
+            features = self.build_frame(image, second, self._next_frame_id, timestamp, timer, mask)
+            frame = core.TrackedFrame(features)
+        if self.localization.on:
+            # Aligned points would pull frames towards the map while odometry still holds them.
+            core.release_images(features)
+        if self._waits_for_mapping:
+            with timer("wait"):
+                self._wait_for_mapping(frame)
+        self._look_again_at_start()
+        with timer("track"):
+            self._count(timestamp)
+            # The samples of the IMU from the image before to this one; None without an IMU.
+            interval = self._take_samples(timestamp)
+            outcome = self.tracking.track(
+                frame, timer, localize=self.localization.on, details=details, interval=interval
+            )
+        return frame, outcome, interval
+
+    def _count(self, timestamp: float) -> None:
+        """Count an image: every id is one image."""
+        self._next_frame_id += 1
+        self._last_timestamp = timestamp
 
     def _make_ready(self, timestamp: float) -> None:
         for worker in self.back_end.workers:
@@ -464,114 +447,3 @@ class Pipeline:
 def _at_once(work: Callable[[], None]) -> None:
     """Do something now, where recorded images wait and results must be equal."""
     work()
-
-
-def _aligning_all(config: Config) -> Config:
-    """For frames that are matched again, when there is time to align all inliers."""
-    alignment = config.alignment
-    if alignment.tracked_inliers == 0:
-        return config
-    return replace(config, alignment=replace(alignment, tracked_inliers=_ALL_INLIERS))
-
-
-def _make_search(
-    setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
-) -> PoseSearch:
-    return PoseSearch(
-        back_end.map,
-        setup.vocabulary,
-        setup.sensor,
-        relocalizer,
-        config.tracking,
-        config.alignment.for_sensor(setup.sensor),
-        pixels_per_radian=setup.settings.camera.pixels_per_radian,
-    )
-
-
-def _make_inertial(
-    setup: Setup, back_end: BackEnd, config: InertialConfig
-) -> InertialTracker | None:
-    """The tracker of an IMU; None without settings of one."""
-    if setup.imu is None:
-        return None
-    workers = back_end.map_workers
-    tracker = InertialTracker(
-        back_end.map,
-        setup.imu,
-        metric=setup.sensor.has_depth,
-        idle=lambda: all(worker.idle for worker in workers),
-        config=config,
-    )
-    if setup.sensor is not Sensor.RGBD:
-        # Where depths are measured, images alone determine keyframes better.
-        back_end.mapping.inertial = tracker.keyframes
-    return tracker
-
-
-def _make_tracking(
-    setup: Setup,
-    back_end: BackEnd,
-    options: SystemOptions,
-    config: Config,
-    inertial: InertialTracker | None,
-) -> Tracking:
-    seed = options.seed
-    sensor, vocabulary = setup.sensor, setup.vocabulary
-    slam_map, mapping = back_end.map, back_end.mapping
-    n_features = setup.settings.orb.n_features
-
-    def acceptance_of(searching: PoseSearch) -> PoseAcceptance:
-        judge = PoseValidator(
-            searching.motion_model_window,
-            setup.settings.camera.pixels_per_radian,
-            config.acceptance,
-        )
-        return PoseAcceptance(searching, judge, MultiHypothesisSearch(searching, judge))
-
-    initializer: Initializer
-    if sensor is Sensor.MONOCULAR:
-        earlier = _make_search(setup, back_end, config)
-        initializer = MonocularInitializer(
-            slam_map,
-            vocabulary,
-            mapping,
-            seed,
-            EarlierFrames(earlier, acceptance_of(earlier)),
-            config=config.initialization,
-        )
-    else:
-        initializer = DepthInitializer(
-            slam_map, vocabulary, mapping, n_features, config.initialization
-        )
-    searching = _make_search(
-        setup,
-        back_end,
-        config,
-        Relocalizer(
-            slam_map,
-            back_end.keyframe_index,
-            seed,
-            fix_scale=sensor.has_depth,
-            config=config.relocalization,
-        ),
-    )
-    return Tracking(
-        slam_map,
-        vocabulary,
-        mapping,
-        initializer=initializer,
-        search=searching,
-        acceptance=acceptance_of(searching),
-        keyframe_decision=KeyframeDecision(
-            slam_map,
-            mapping.worker,
-            sensor,
-            setup.settings.max_keyframe_interval,
-            config.keyframes,
-            waits=options.wait_for_mapping and not options.deterministic,
-        ),
-        config=config,
-        has_depth=sensor.has_depth,
-        new_map_after=options.new_map_after if options.several_maps else None,
-        inertial=inertial,
-    )

@@ -13,11 +13,12 @@ import logging
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py._values import replace
 from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.config import Config
+from orbslam2py.slam.followed_frames import FollowedFrames
 from orbslam2py.slam.inertial import ImuInterval, InertialTracker
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
@@ -83,6 +84,8 @@ class Tracking:
         the old one is searched, for ever.
     inertial : InertialTracker or None
         Predicts poses by an IMU.
+    followed : FollowedFrames or None
+        Tracks frames without features.
     """
 
     def __init__(
@@ -99,6 +102,7 @@ class Tracking:
         has_depth: bool,
         new_map_after: float | None = None,
         inertial: InertialTracker | None = None,
+        followed: FollowedFrames | None = None,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
@@ -109,6 +113,7 @@ class Tracking:
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
         self._inertial = inertial
+        self._followed = followed
         self._transitions = Transitions(config, new_map_after=new_map_after)
         self._state = State()
 
@@ -234,6 +239,21 @@ class Tracking:
         interval : ImuInterval or None
             Samples of the IMU since the frame before.
         """
+        result = self._track(frame, timer, localize=localize, details=details, interval=interval)
+        if self._followed is not None:
+            ok = result.state is TrackingState.OK and not result.estimate.unconfirmed
+            self._followed.note(frame if ok else None)
+        return result
+
+    def _track(
+        self,
+        frame: core.TrackedFrame,
+        timer: StageTimer,
+        *,
+        localize: bool,
+        details: bool,
+        interval: ImuInterval | None,
+    ) -> TrackingResult:
         if self._inertial is not None:
             self._state = self._inertial.predict(interval, self._state, frame.timestamp)
         if self._state.initializing:
@@ -272,28 +292,42 @@ class Tracking:
         frame.discard_outliers()
         return TrackingResult(self._state.phase, estimate, is_keyframe, inliers=inliers)
 
-    def take_followed(
-        self, frame: core.TrackedFrame, estimate: PoseEstimate, state: State
-    ) -> TrackingResult:
-        """Take a frame whose pose the patches of known points gave; it becomes no keyframe.
+    def follow(
+        self,
+        image: ByteArray,
+        depth: ByteArray | None,
+        frame_id: int,
+        timestamp: float,
+        *,
+        details: bool,
+    ) -> tuple[core.TrackedFrame, TrackingResult] | None:
+        """Track an image without features by the patches of known points.
+
+        The frame becomes no keyframe.
 
         Parameters
         ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame with its pose.
-        estimate : PoseEstimate
-            How it was found.
-        state : State
-            The state before the frame, which follows the map.
-        """
-        self._state = state
-        self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
-        return TrackingResult(self._state.phase, estimate)
+        image, depth
+            Of the frame; no depth with a single camera.
+        frame_id, timestamp
+            Number and time [s] of the frame.
+        details : bool
+            The outcome is to say which keypoints the pose was accepted with.
 
-    @property
-    def tracking_state(self) -> State:
-        """All that is carried from one image to the next."""
-        return self._state
+        Returns
+        -------
+        tuple or None
+            The frame with its pose, and what was found; None where the image needs features.
+        """
+        if self._followed is None:
+            return None
+        found = self._followed.follow(image, depth, frame_id, timestamp, self._state)
+        if found is None:
+            return None
+        frame, estimate, self._state = found
+        self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
+        inliers = accepted_keypoints(frame) if details else None
+        return frame, TrackingResult(self._state.phase, estimate, inliers=inliers)
 
     def _follow_imu(
         self,

@@ -25,14 +25,10 @@ class MapMove:
     turn: core.Pose
     """From the world before to the new one, after the scale."""
 
-    def applies_to(self, record: TrackingRecord) -> bool:
-        """Whether a record has a pose in the world before."""
-        is_earlier = record.map_index == self.map_index and record.timestamp <= self.until
-        return is_earlier and record.T_cw is not None
-
     def apply(self, record: TrackingRecord) -> TrackingRecord:
         """Return a record with its pose, covariance and velocity in the new world."""
-        if not self.applies_to(record) or record.T_cw is None:
+        is_earlier = record.map_index == self.map_index and record.timestamp <= self.until
+        if not is_earlier or record.T_cw is None:
             return record
         T_cw = record.T_cw.copy()
         T_cw[:3, 3] *= self.scale
