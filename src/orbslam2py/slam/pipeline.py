@@ -23,6 +23,7 @@ from orbslam2py.maps.map_autosave import MapAutosave, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
+from orbslam2py.slam.config import USUAL_FEATURES
 from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.inertial import ImuInterval, ImuVerdict, InertialInput
@@ -51,6 +52,11 @@ _NO_SECONDS = 1e11
 #: Keyframes after which the first frames of a map are estimated again, and frames at the latest.
 _SETTLED_MAP, _YOUNG_FRAMES = 10, 250
 
+
+_NOT_FOLLOWED = (
+    "frames are tracked with features: alignment.follow (effort light) is for one camera, or RGB-D "
+    f"with {USUAL_FEATURES} features or more, and without an IMU"
+)
 
 #: The image; the right image, the depth, the images of a rig, or None; the mask.
 _GivenImages = tuple[ByteArray, Any, Any]
@@ -110,6 +116,10 @@ class Pipeline:
         self.tracking = make_tracking(
             setup, back_end, options, config, self.front_end, self.inertial_tracker
         )
+        #: Frames are tracked without features where patches are enough.
+        self._follows = alignment.follow and self.inertial_tracker is None
+        if options.full_config.alignment.follow and not self._follows:
+            _log.warning("%s", _NOT_FOLLOWED)
         in_time = not (options.deterministic or options.wait_for_mapping)
         self.inertial = InertialInput(
             setup.imu, back_end.events.worker.offer if in_time else _at_once
@@ -232,8 +242,7 @@ class Pipeline:
     ) -> tuple[core.TrackedFrame, TrackingResult, None] | None:
         """Track images without features; return None where they are needed."""
         image, depth, mask = images
-        usable = self.inertial_tracker is None and mask is None and not self.localization.on
-        if not (self.alignment.follow and usable):
+        if not self._follows or mask is not None or self.localization.on:
             return None
         if self._waits_for_mapping:
             with timer("wait"):

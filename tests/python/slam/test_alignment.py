@@ -144,8 +144,11 @@ def test_a_mask_needs_features() -> None:
         assert system.track(shown, 100.0, mask=mask).method is not PoseMethod.PATCHES
 
 
-def test_pairs_are_not_followed() -> None:
-    assert not AlignmentConfig(stereo=True, follow=True).for_sensor(Sensor.STEREO).follow
+def test_pairs_are_not_followed_and_a_warning_says_so(caplog: pytest.LogCaptureFixture) -> None:
+    new_system(Sensor.RGBD, config=FOLLOW)
+    assert "tracked with features" not in caplog.text
+    new_system(Sensor.STEREO, effort="light")
+    assert "is for one camera, or RGB-D" in caplog.text
 
 
 def test_repeated_runs_without_features_are_equal() -> None:
