@@ -5,13 +5,15 @@ Worlds with motions that are hard to follow are played with the three sensors, 4
 features and new seeds, small and deterministic, and every pose is compared with the truth.
 `--part block` drives around 320 m of street with sharp corners, at full size. `--part recorded`
 plays the recorded sequences in ways that are harder than they were: every second to fourth image,
-backwards, images dropped, blurred, darkened, rolled. What has been played with the present code
+backwards, images dropped, blurred, darkened, rolled. `--part images` plays easy motions with more
+or less noise, blur and contrast, for the spreads of the errors in stated deviations. What has been played with the present code
 stands in the CSV file and is not played again.
 
     python -m benchmarks.holding_on --runs 60
     python -m benchmarks.holding_on --runs 1000 --sensors stereo rgbd --jobs 2
     python -m benchmarks.holding_on --part block --runs 10
     python -m benchmarks.holding_on --part recorded --runs 248
+    python -m benchmarks.holding_on --part images --runs 108
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from benchmarks.harness.arguments import (
     new_parser,
 )
 from benchmarks.harness.folders import CHECKOUT
-from benchmarks.holding_on.made_up import block_cases, motion_cases
+from benchmarks.holding_on.made_up import block_cases, image_cases, motion_cases
 from benchmarks.holding_on.recorded import recorded_cases
 from benchmarks.holding_on.results import (
     append_row,
@@ -43,6 +45,7 @@ from benchmarks.holding_on.results import (
 )
 from benchmarks.holding_on.runs import all_rows
 from benchmarks.holding_on.scene import Case
+from orbslam2py.slam.config import read_change
 
 
 def version() -> str:
@@ -55,26 +58,28 @@ def version() -> str:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parts = ("motions", "block", "recorded")
+    parts = ("motions", "block", "recorded", "images")
     parser.add_argument("--part", choices=parts, default="motions", help="[motions]")
     add_counts(parser, runs=(60, "how many"), jobs=(1, "processes at once"))
     add_sensors(parser)
     parser.add_argument("--only", metavar="TEXT", help="runs with this text in their name")
     parser.add_argument("--csv", type=Path, help="file of all runs [build/holding_on/COMMIT.csv]")
     parser.add_argument("--again", action="store_true", help="play what is in the file, too")
+    parser.add_argument("--set", nargs="+", metavar="NAME=VALUE", help="configuration", default=[])
     add_width(parser)
     arguments = parser.parse_args()
     run(arguments, console_of(arguments))
 
 
 def run(arguments: argparse.Namespace, console: Console) -> None:
-    commit = version()
+    changes = dict(map(read_change, arguments.set))
+    commit = "-".join([version(), *(f"{key}={value}" for key, value in changes.items())])
     path: Path = arguments.csv or CHECKOUT / "build" / "holding_on" / f"{commit}.csv"
     cases = chosen_cases(arguments)
     rows = read_rows(path)
     write_rows(path, rows.values())
     missing = [case for case in cases if arguments.again or case.key not in rows]
-    for done, row in enumerate(all_rows(missing, arguments.jobs), 1):
+    for done, row in enumerate(all_rows(missing, arguments.jobs, changes), 1):
         rows[row["key"]] = row
         append_row(path, row)
         console.print(
@@ -91,8 +96,8 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
 def chosen_cases(arguments: argparse.Namespace) -> list[Case]:
     if arguments.part == "block":
         return list(block_cases(arguments.runs))
-    cases_of = recorded_cases if arguments.part == "recorded" else motion_cases
-    every: Iterator[Case] = cases_of(arguments.sensors)
+    kinds = {"motions": motion_cases, "recorded": recorded_cases, "images": image_cases}
+    every: Iterator[Case] = kinds[arguments.part](arguments.sensors)
     if arguments.only is not None:
         every = (case for case in islice(every, 100_000) if arguments.only in case.key)
     return list(islice(every, arguments.runs))

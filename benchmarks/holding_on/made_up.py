@@ -86,6 +86,20 @@ SITUATIONS = [
     _indoors("turns on the spot", "room", motion="turn-on-the-spot"),
 ]
 SENSORS = ("stereo", "rgbd", "mono")
+#: What images are like: noise in grey levels, exposure as a factor on the grey values, blur.
+IMAGES: dict[str, dict[str, Any]] = {
+    "noise of 0.3": {"noise": 0.3},
+    "noise of 1": {"noise": 1.0},
+    "noise of 3": {"noise": 3.0},
+    "half blurred": {"noise": 1.0, "blur": 0.5},
+    "half the contrast": {"noise": 1.0, "exposure": 0.5},
+    "double contrast": {"noise": 1.0, "exposure": 2.0},
+}
+_SEEN_BY = [
+    {"world": "corridor", "frames": 100, "size": INDOORS},
+    {"world": "room", "frames": 100, "size": INDOORS},
+    {"world": "street", "frames": 70, "size": OUTDOORS},
+]
 
 
 class MadeUpScene:
@@ -176,17 +190,13 @@ class MadeUpCase:
     @property
     def key(self) -> str:
         """All that tells it from other runs."""
-        return f"{self.situation} | {self.sensor} | {self.features} | {self.seed}"
+        world = f" | {self.of.options['world']}" if self.situation in IMAGES else ""
+        return f"{self.situation}{world} | {self.sensor} | {self.features} | {self.seed}"
 
     def options(self) -> SyntheticOptions:
         """Options of the sequence."""
-        return SyntheticOptions(
-            sensor=self.sensor,
-            seed=self.seed,
-            noise=1.5,
-            depth_noise=0.002,
-            **self.of.options,
-        )
+        options: dict[str, Any] = {"noise": 1.5, "depth_noise": 0.002, **self.of.options}
+        return SyntheticOptions(sensor=self.sensor, seed=self.seed, **options)
 
     def scene(self) -> MadeUpScene:
         """World and motion, to be played."""
@@ -216,6 +226,17 @@ def motion_cases(sensors: Sequence[str]) -> Iterator[MadeUpCase]:
         features = FEATURES[(turn // len(sensors) + place) % len(FEATURES)]
         yield MadeUpCase(situation, sensor, features, seed=turn)
         number += 1
+
+
+def image_cases(sensors: Sequence[str]) -> Iterator[MadeUpCase]:
+    """Endless: every round plays all kinds of images in three worlds, with all sensors."""
+    seed = 0
+    while True:
+        for name, kind in IMAGES.items():
+            for world in _SEEN_BY:
+                for sensor in sensors:
+                    yield MadeUpCase(Situation(name, {**world, **kind}), sensor, 1000, seed)
+        seed += 1
 
 
 def block_cases(n: int) -> Iterator[MadeUpCase]:

@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "inertial/small_product.hpp"
 #include "inertial/so3.hpp"
 
 namespace orbslam {
@@ -57,10 +58,8 @@ void InertialFilter::predict(const std::vector<ImuSample>& samples, double scale
 
   Matrix9d to_world = Matrix9d::Identity();
   to_world.block<3, 3>(3, 3) = to_world.block<3, 3>(6, 6) = factor * R;
-  const Covariance moved = F * covariance_ * F.transpose();
-  covariance_ = moved;
-  const Matrix9d noise = to_world * motion.covariance() * to_world.transpose();
-  covariance_.topLeftCorner<9, 9>() += noise;
+  covariance_ = transported(F, covariance_);
+  covariance_.topLeftCorner<9, 9>() += transported(to_world, motion.covariance());
   covariance_.block<6, 6>(kGyro, kGyro) += motion.bias_walk_covariance();
   covariance_(kScale, kScale) += scale_walk * scale_walk * dt;
   // The map turns under the camera, and what is fixed to the world turns in it: velocity, gravity.
@@ -93,7 +92,7 @@ InertialFilter::ByPose InertialFilter::by_errors() const {
 
 PoseGaussian InertialFilter::pose() const {
   const ByPose J = by_errors();
-  PoseGaussian gaussian{T_cb_ * state_.T_wb.inverse(), J * covariance_ * J.transpose()};
+  PoseGaussian gaussian{T_cb_ * state_.T_wb.inverse(), transported(J, covariance_)};
   make_symmetric(gaussian.covariance);
   return gaussian;
 }
@@ -111,12 +110,12 @@ void InertialFilter::add(const Error& error) {
 
 void InertialFilter::condition(const Vector6d& error, const Matrix6d& covariance) {
   const ByPose J = by_errors();
-  const Matrix6d before = J * covariance_ * J.transpose();
+  const Matrix6d before = transported(J, covariance_);
   const Eigen::LDLT<Matrix6d> factor(before);
   const Eigen::Matrix<double, kSize, 6> cross = covariance_ * J.transpose();
   const Eigen::Matrix<double, kSize, 6> gain = factor.solve(cross.transpose()).transpose();
   add(gain * error);
-  covariance_ += gain * (covariance - before) * gain.transpose();
+  covariance_ += transported(gain, Matrix6d(covariance - before));
   make_symmetric(covariance_);
 }
 
@@ -141,8 +140,7 @@ void InertialFilter::update(const Pose& T_cw, const Matrix6d& covariance) {
   add(gain * error);
   // Joseph's form stays positive.
   const Covariance kept = Covariance::Identity() - gain * J;
-  const Covariance shrunk = kept * covariance_ * kept.transpose();
-  covariance_ = shrunk + gain * covariance * gain.transpose();
+  covariance_ = transported(kept, covariance_) + transported(gain, covariance);
   make_symmetric(covariance_);
 }
 
@@ -162,7 +160,7 @@ void InertialFilter::move(const Pose& T_cw) {
   Covariance A = Covariance::Identity();
   A.block<3, 3>(kVelocity, kVelocity) = R;
   A.block<3, 3>(kPosition, kPosition) = R;
-  covariance_ = (A * covariance_ * A.transpose()).eval();
+  covariance_ = transported(A, covariance_);
   state_.T_wb = T_wb;
   state_.velocity = R * state_.velocity;
 }
@@ -175,7 +173,7 @@ void InertialFilter::anchor() {
   A.block<3, 3>(kPosition, kPosition).setZero();
   A.block<3, 3>(kVelocity, kRotation) = skew(state_.velocity) * R;
   A.block<2, 3>(kTilt, kRotation) = -R.topRows<2>();
-  covariance_ = (A * covariance_ * A.transpose()).eval();
+  covariance_ = transported(A, covariance_);
 }
 
 void InertialFilter::transform(const Eigen::Quaterniond& rotation, double factor,
@@ -184,7 +182,7 @@ void InertialFilter::transform(const Eigen::Quaterniond& rotation, double factor
   Covariance A = Covariance::Identity();
   A.block<3, 3>(kVelocity, kVelocity) = factor * R;
   A.block<3, 3>(kPosition, kPosition) = factor * R;
-  covariance_ = (A * covariance_ * A.transpose()).eval();
+  covariance_ = transported(A, covariance_);
   // The camera stays where it is in the map.
   const Pose T_wc = state_.T_wb * T_bc_;
   const Pose moved((rotation * T_wc.rotation()).normalized(),

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "inertial/imu_residual.hpp"
+#include "inertial/small_product.hpp"
 #include "inertial/so3.hpp"
 
 namespace orbslam {
@@ -26,8 +27,13 @@ constexpr double kSpeed = 0.05, kPlace = 0.02;
 constexpr Index kView = 9;
 enum Common { kGyroAt = 0, kAccelAt = 3, kTiltAt = 6, kScaleAt = 8, kCommon = 9 };
 
+/// The smallest rotation after which gravity points along -z.
 Eigen::Quaterniond turn_up(const Eigen::Vector3d& gravity) {
-  return Eigen::Quaterniond::FromTwoVectors(gravity, Eigen::Vector3d(0, 0, -1)).normalized();
+  const Eigen::Vector3d g = gravity.normalized();
+  // The cross product with -z, and one more than the cosine.
+  Eigen::Quaterniond turn(1 - g.z(), -g.y(), g.x(), 0);
+  if (turn.squaredNorm() < 1e-24) turn = Eigen::Quaterniond(0, 1, 0, 0);  // it points along z
+  return turn.normalized();
 }
 
 class Problem {
@@ -173,7 +179,7 @@ class Problem {
     A.block<3, 1>(3, 17) = -R * velocities_.back();
     A.block<3, 3>(6, 6) = R;
     A(17, 17) = options_.metric ? 0 : -1;
-    start.covariance = A * P * A.transpose();
+    start.covariance = transported(A, P);
     return start;
   }
 
@@ -206,11 +212,12 @@ class Problem {
       Eigen::Matrix<double, 9, 2 * kView + kCommon> J;
       J << by_view(r.by_first, k), by_view(r.by_second, k + 1), r.by_bias, r.by_gravity * by_tilt,
           by_scale(r, k);
-      const Matrix9d information = motions_[k].covariance().ldlt().solve(Matrix9d::Identity());
-      const Eigen::Matrix<double, 9, 2 * kView + kCommon> WJ = information * J;
+      const Eigen::LDLT<Eigen::MatrixXd> factor(motions_[k].covariance());
+      const Matrix9d information = factor.solve(Eigen::MatrixXd::Identity(9, 9));
+      const Eigen::Matrix<double, 2 * kView + kCommon, 9> transposed = J.transpose();
       const Vector9d We = information * r.error;
       cost += r.error.dot(We);
-      add(i * kView, common, J.transpose() * WJ, J.transpose() * We);
+      add(i * kView, common, product(transposed, product(information, J)), transposed * We);
     }
     for (Index i = 0; i < n; ++i) cost += add_view_prior(i);
     cost +=

@@ -12,11 +12,13 @@ import pytest
 from benchmarks.holding_on import __main__ as program
 from benchmarks.holding_on.judgement import judge
 from benchmarks.holding_on.made_up import (
+    IMAGES,
     SENSORS,
     SITUATIONS,
     MadeUpCase,
     MadeUpScene,
     Situation,
+    image_cases,
     motion_cases,
 )
 from benchmarks.holding_on.play import Played, play
@@ -198,6 +200,15 @@ def test_every_round_plays_all_situations_and_all_sensors_come_up():
             (sensor, features) for sensor in SENSORS for features in (400, 1000, 2000)
         }
         assert all(len(case.scene()) >= 60 for case in some[:1])
+
+
+def test_a_round_plays_all_kinds_of_images_with_all_sensors_in_all_worlds():
+    cases = list(islice(image_cases(SENSORS), 2 * 54))
+    assert len({case.key for case in cases}) == len(cases)
+    for name, kind in IMAGES.items():
+        some = [case for case in cases if case.situation == name]
+        assert len({(case.sensor, case.of.options["world"]) for case in some}) == 9
+        assert {case.options().noise for case in some} == {kind["noise"]}
 
 
 def test_an_interrupted_file_is_read_and_made_whole(tmp_path):
