@@ -950,7 +950,7 @@ class Frame:
         """
 class TrackedFrame:
     """
-    A frame with the pose and the associations the tracker gives it. Arrays are copies.
+    A frame with its pose and the map point of each keypoint, set by tracking. Arrays are copies.
     """
     def __init__(self, features: Frame) -> None:
         ...

@@ -225,7 +225,8 @@ void bind_frame_class(py::module_& module) {
 void bind_tracked_frame(py::module_& module) {
   py::class_<TrackedFrame, std::shared_ptr<TrackedFrame>>(
       module, "TrackedFrame",
-      "A frame with the pose and the associations the tracker gives it. Arrays are copies.")
+      "A frame with its pose and the map point of each keypoint, set by tracking. Arrays are "
+      "copies.")
       .def(py::init([](const std::shared_ptr<Frame>& frame) { return TrackedFrame(frame); }),
            py::arg("features").none(false))
       .def_property_readonly(

@@ -87,7 +87,8 @@ struct AlignedPixel {
   float right_factor = 1;    ///< inverse variance of the right column over that
 };
 
-/// A frame in the tracker's hands: pose and associations, which change while it is tracked.
+/// A frame with what tracking estimates of it: its pose, and the map point of each keypoint.
+/// `frame` holds the measurements: keypoints, descriptors and depths.
 struct TrackedFrame {
   std::shared_ptr<const Frame> frame;
   std::optional<Pose> T_cw;
@@ -98,8 +99,8 @@ struct TrackedFrame {
   std::vector<MapPointId> map_points;
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint8_t> outlier;
-  /// Where some keypoints see their points by patches; empty, or one per keypoint. An entry counts
-  /// as long as its keypoint keeps that point.
+  /// Pixels of some keypoints by alignment of patches; empty, or one entry per keypoint. An entry
+  /// is valid as long as its keypoint keeps the same point.
   std::vector<AlignedPixel> aligned;
 
   explicit TrackedFrame(std::shared_ptr<const Frame> f)
@@ -120,7 +121,7 @@ struct TrackedFrame {
     outlier[i] = 0;
   }
   void clear_associations();
-  /// Null where the keypoint, and not its patch, says where the point is seen.
+  /// The aligned pixel of keypoint `i`; null if the observation uses the keypoint's own pixel.
   const AlignedPixel* aligned_at(std::size_t i) const {
     const bool is_aligned =
         !aligned.empty() && aligned[i].point.valid() && aligned[i].point == map_points[i];
@@ -136,8 +137,8 @@ struct TrackedFrame {
   std::size_t n_associated() const;
   /// Inliers among them that are points of the map, not temporary ones.
   std::size_t n_map_inliers() const;
-  /// Over the close keypoints; both 0 without depth. Tells whether a keyframe is needed to bring
-  /// new close points into the map.
+  /// Over the close keypoints; both 0 without depth. They decide whether a keyframe is needed for
+  /// new close points.
   CloseCounts n_close_tracked_untracked() const;
 };
 

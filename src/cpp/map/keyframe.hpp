@@ -37,7 +37,7 @@ struct KeyFrame {
   std::vector<KeyFrameId> neighbours;
 
   KeyFrameId parent;                ///< spanning tree; invalid for roots and before publication
-  bool provisional_parent = false;  ///< there was no neighbour yet; the first one replaces it
+  bool provisional_parent = false;  ///< parent by order in time only; a covisible one replaces it
   std::set<KeyFrameId> children;
   std::set<KeyFrameId> loop_edges;
 

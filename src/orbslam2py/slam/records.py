@@ -52,7 +52,7 @@ class Reason(str, enum.Enum):
 
 
 class Verdict(str, enum.Enum):
-    """Whether a pose is accepted, by its evidence."""
+    """Decision about a pose, made from its evidence: accepted, uncertain, or rejected."""
 
     STRONG = "strong"
     """Accepted: as many expected points were found as in the frames before."""
