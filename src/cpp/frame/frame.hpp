@@ -18,8 +18,8 @@
 
 namespace orbslam {
 
-/// What one image (pair) says, without any interpretation: features, depths, words. Built once,
-/// then shared read-only by the tracker and the keyframe made from it.
+/// Measurements of one image (or pair): features, depths, words. It holds no pose and no map
+/// points. It is built once, then shared read-only by the tracker and the keyframe made from it.
 struct Frame {
   FrameId id = -1;
   double timestamp = 0;  ///< seconds, as given by the caller
@@ -38,15 +38,16 @@ struct Frame {
   /// Of each right column that was aligned (frame/right_alignment.hpp), else 0 [px^2]; may be
   /// empty.
   std::vector<float> right_variance;
-  std::shared_ptr<FrameImages> images;  ///< null: nobody aligns patches in this frame
-  SmallImage small_image;  ///< of the image, the left one of a pair; empty when nobody kept it
+  std::shared_ptr<FrameImages> images;  ///< null: patches are not aligned in this frame
+  SmallImage small_image;  ///< of the image, the left one of a pair; empty when it was not kept
 
   WordVector words;          ///< filled by describe() (places/), before the frame is shared
   DirectIndex direct_index;  ///< same
   bool described = false;
 
   std::size_t size() const { return keypoints.size(); }
-  /// The one test of "is a stereo observation": a virtual right column may be negative.
+  /// True if keypoint i has a depth. Test depths and not right columns: a virtual right column may
+  /// be negative.
   bool has_depth(std::size_t i) const { return depth[i] > 0.0F; }
   /// The depth can be trusted from one view: see docs/method/frame.md#close-and-far-points.
   bool is_close(std::size_t i) const {
@@ -56,7 +57,7 @@ struct Frame {
   Eigen::Vector3d unproject(std::size_t i) const {
     return camera->unproject(keypoints[i].x, keypoints[i].y, depth[i]);
   }
-  /// Where the camera that shows keypoint i is in the world, at a pose of the frame.
+  /// Centre (world) of the camera that keypoint i belongs to, for a pose of the frame.
   Eigen::Vector3d center_of(std::size_t i, const Pose& T_cw) const {
     if (!camera->is_rig()) return T_cw.center();
     return T_cw.rotation().conjugate() * (camera->centre(keypoints[i].x) - T_cw.translation());
@@ -79,7 +80,7 @@ struct Anchor {
   MapIndex map = kNoMap;         ///< KeyFrame::map of it
 };
 
-/// Where a keypoint of a tracked frame sees its map point by the point's patch.
+/// Pixel of a map point in a tracked frame, found by alignment of the point's patch.
 struct AlignedPixel {
   MapPointId point;  ///< invalid: not aligned
   float u = 0, v = 0, right_u = 0;
