@@ -84,7 +84,7 @@ def load() -> ModuleType:
         return importlib.import_module(NAME)
     except ImportError as error:
         if isinstance(error.__cause__, KeyboardInterrupt):
-            # Ctrl-C while it was loaded, which pybind11 tells as a failure to load.
+            # Ctrl-C during loading, which pybind11 reports as a failure to load.
             raise KeyboardInterrupt from error
         folder = Path(__file__).parent
         names = sorted(path.name for path in folder.glob("_core.*.so"))

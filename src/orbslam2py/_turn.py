@@ -24,7 +24,7 @@ class Turn:
         self._condition = threading.Condition()
         self._waiting: deque[int] = deque()
         self._depth = 0
-        #: The thread whose turn it is, None if it is nobody's.
+        #: The thread whose turn it is; None without one.
         self.owner: int | None = None
 
     def __enter__(self) -> None:

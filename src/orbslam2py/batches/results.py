@@ -124,7 +124,10 @@ class Results:
 
     @contextlib.contextmanager
     def table(self) -> Iterator[Path]:
-        """Give a folder for the files of the table; the end of the ``with`` uploads them."""
+        """Yield a local folder for the files of the table.
+
+        The files are uploaded at the end of the ``with`` block.
+        """
         if self.folder is not None:
             yield self.folder
             return

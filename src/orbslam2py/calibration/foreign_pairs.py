@@ -41,7 +41,7 @@ class Pair:
     where
         The file or the files, for messages.
     file
-        What the file of the left camera holds.
+        Contents of the file of the left camera.
     left, right
         The cameras.
     alone
@@ -78,7 +78,7 @@ def pair_settings(pair: Pair, fps: float) -> Settings:
     Raises
     ------
     SettingsError
-        If the cameras do not make a pair, or the file does not tell how they stand.
+        If the cameras do not make a pair, or the file does not contain their relative pose.
     """
     if pair.file.rectified:
         return _rectified_pair(pair, fps)

@@ -56,8 +56,8 @@ def read_gopro_imu(path: str | Path) -> ImuSamples | None:
     """Read the samples of gyro and accelerometer of a GoPro video.
 
     The times begin with the first image, as those of the images do. Axes are put in the order x, y,
-    z if the video tells their order (``ORIN``, since HERO6); else a warning says that they are as
-    recorded. The accelerometer is interpolated at the times of the gyro.
+    z if the video contains their order (``ORIN``, since HERO6); else a warning says that they are
+    as recorded. The accelerometer is interpolated at the times of the gyro.
 
     Parameters
     ----------

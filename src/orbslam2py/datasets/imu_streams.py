@@ -51,7 +51,7 @@ def read_imu_streams(
     Raises
     ------
     DatasetError
-        Naming the file, the line and what is wrong there.
+        Naming the file, the line and the fault.
     """
     streams: dict[str, FloatArray] = {}
     for path in map(Path, (first, second)):

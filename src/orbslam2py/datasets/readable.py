@@ -158,7 +158,7 @@ class ReadableImu:
     name
         Whose they are.
     description
-        What is read.
+        One line about the data that are read.
     example
         Files or lines of it.
     """

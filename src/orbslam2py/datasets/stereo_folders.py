@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 #: Least share of the smaller series that must have a partner of the same name or number.
 _COMMON = 0.5
-#: What a pair looks like, for messages.
+#: Layout of a pair, for messages.
 A_PAIR = (
     "a pair is two folders of images, such as left and right or cam0 and cam1, or two series in "
     "one folder, such as left_0000.png and right_0000.png; for images that hold both views side "

@@ -24,7 +24,7 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_tu
 
 _log = logging.getLogger(__name__)
 
-#: Names under which an association file is looked for, the first that is there counts.
+#: Possible names of an association file; the first existing one is used.
 ASSOCIATION_NAMES = ("associations.txt", "association.txt", "associate.txt", "assoc.txt")
 
 

@@ -57,7 +57,7 @@ class VideoReader:
             raise DatasetError(f"video {self.path} does not exist; check the path")
         self._capture = self._open()
         self._next = 0
-        #: Frames per second as the file tells; 0 if it does not.
+        #: Frames per second in the file; 0 if it does not.
         self.fps = _rate(self._capture)
 
     def scan(self) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from orbslam2py.datasets.base import FrameTimes
 
-#: Stages of the latency in their order, and what each is.
+#: Stages of the latency in their order, with descriptions.
 LATENCY_STAGES = {
     "latency.transport": "from the middle of the exposure until the image is in this computer",
     "latency.pairing": "waiting for the other image of the same moment",

@@ -67,10 +67,10 @@ class RunOptions:
     autosave: float | None = None
     """Interval at which the maps are also saved during the run, seconds."""
     imu: bool | None = None
-    """Whether the samples of an IMU go into the system; None: if the recording has samples and
-    something tells its settings."""
+    """Whether the samples of an IMU go into the system; None: if the recording has samples and its
+    settings are known."""
     imu_settings: ImuSettings | None = None
-    """The IMU beside the unrectified (left) camera; by default what comes with the recording."""
+    """The IMU beside the unrectified (left) camera; by default those of the recording."""
     imu_samples: ImuSamples | None = None
     """Its samples; by default those of the recording."""
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lens models of settings beyond the pinhole: names, parameters, and other programs' names.
 
-Fisheye models, and OpenCV's thin prism: their keypoints are pixels of the images as they come.
+Fisheye models, and OpenCV's thin prism: their keypoints are pixels of the unrectified images.
 """
 
 from __future__ import annotations

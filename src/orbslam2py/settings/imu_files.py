@@ -78,7 +78,7 @@ def read_imu_settings(*paths: str | PathLike[str], noise: ImuNoise | None = None
 
 
 def has_imu_keys(path: Path) -> bool:
-    """Whether a settings file tells anything about an IMU."""
+    """Whether a settings file contains keys of an IMU."""
     try:
         return bool(_statements_of(path))
     except SettingsError:
@@ -86,7 +86,7 @@ def has_imu_keys(path: Path) -> bool:
 
 
 def imu_of_settings_file(path: Path, noise: ImuNoise | None = None) -> ImuSettings | None:
-    """Read what a settings file of a camera also says of an IMU.
+    """Read the keys of an IMU in a settings file of a camera.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def imu_of_settings_file(path: Path, noise: ImuNoise | None = None) -> ImuSettin
     Returns
     -------
     ImuSettings or None
-        None if there is no such file or it says nothing. What is incomplete or wrong is logged as a
-        warning, since the camera can be used without it.
+        None if there is no such file or it says nothing. Missing or wrong values are logged as a
+        warning, because the camera can be used without them.
     """
     if not path.is_file() or not has_imu_keys(path):
         return None

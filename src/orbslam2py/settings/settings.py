@@ -81,7 +81,8 @@ class Settings:
     viewer
         Appearance of the map view.
     right
-        The right camera of a fisheye pair, whose images are matched as they are; else None.
+        The right camera of a fisheye pair, whose images are matched without rectification; else
+        None.
     rig
         The cameras of a rig, the first of which is the body and is also `camera`; else None.
 

@@ -93,7 +93,7 @@ class SystemOptions:
 
 
 def _changes_of(given: Any) -> dict[str, float | int | bool]:
-    """Return a configuration from changes (names with a dot) or from a whole one."""
+    """Return changes of a configuration, given as changes or as a whole `Config`."""
     if isinstance(given, Config):
         return given.changes()
     if not isinstance(given, Mapping):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Raw stereo pairs in the front end: rectified before features are found, or as they are."""
+"""Raw stereo pairs in the front end: rectified before features are detected, or not rectified."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RawPairs:
     Attributes
     ----------
     warning : str or None
-        What was logged: the first pairs come rectified already.
+        The logged text: the first pairs come rectified already.
     """
 
     def __init__(self, pair: StereoRectification, extract: Extract) -> None:
@@ -121,7 +121,7 @@ def _same_points(left: core.Extraction, right: core.Extraction) -> tuple[FloatAr
 
 
 def raw_pairs_of(settings: Settings, extract: Extract) -> RawPairs | None:
-    """Make what rectifies the pairs of an application; None if they come as they are tracked."""
+    """Make the rectification of an application's pairs; None if they need none."""
     pair = settings.rectification
     if pair is None or pair.applied:
         return None

@@ -91,7 +91,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        #: What is wrong although it can be read: whole sentences.
+        #: Faults of a bag that can be read: whole sentences.
         self.doubts: list[str] = []
         paths = _files_of(path, self.doubts)
         self.layout = _kind_of(paths[0])[0]

@@ -227,7 +227,7 @@ def settings_of_pair(
     if bf < 0:
         raise _exchanged(right.what)
     if not rectified and (left.is_fisheye or right.is_fisheye):
-        # P and R tell the same as a transform.
+        # P and R give the same as a transform.
         T = np.eye(4)
         T[:3, :3] = right.R.T @ left.R
         T[:3, 3] = right.R.T @ (-bf / left.rectified_K[0, 0], 0.0, 0.0)

@@ -18,7 +18,7 @@ from orbslam2py.errors import DatasetError
 
 EntryT = TypeVar("EntryT")
 
-#: What comes of numbers, texts and fields that are not what the format says.
+#: Errors for numbers, texts and fields that violate the format.
 _DAMAGE = (struct.error, LookupError, ValueError, OverflowError, MemoryError)
 #: Chunks that are kept decompressed: the cameras' messages of one moment lie close together.
 _KEPT_CHUNKS = 4

@@ -116,7 +116,7 @@ class SqliteFile:
                     database.close()
                     raise
                 except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-                    # Without it, a file that is shorter than its head says is not even looked at.
+                    # Without it, a file that is shorter than its header says cannot be opened.
                     database.execute("PRAGMA writable_schema = ON")
                     self._doubt(error)
                 return database

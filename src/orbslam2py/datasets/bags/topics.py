@@ -23,13 +23,13 @@ from orbslam2py.datasets.pair_names import side_of_pair
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.settings import Sensor
 
-#: What may be named, and by which other words.
+#: Roles that may be named, and other words for them.
 ROLES = ("left", "right", "depth", "left_info", "right_info", "depth_info", "truth")
 _ALIASES = {"image": "left", "color": "left", "colour": "left", "rgb": "left", "info": "left_info"}
 _ROLES_ARE = (
     "roles are image or left, right, depth, info or left_info, right_info, depth_info, truth"
 )
-#: The topic that is taken as the true poses of the camera if nobody names one.
+#: The topic that is used as ground truth by default.
 _TRUTH = "/ground_truth"
 _COLOUR = re.compile(r"rgb|colou?r", re.IGNORECASE)
 _REGISTERED = re.compile(r"regist|aligned|depth_to_(rgb|colou?r)", re.IGNORECASE)

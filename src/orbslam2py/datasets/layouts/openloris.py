@@ -41,7 +41,7 @@ class OpenLorisSequence(DepthSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence."""
+        """Return whether a folder is such a sequence."""
         return (folder / _COLOUR).is_file() and (folder / "color").is_dir()
 
     def _list(self, folder: Path) -> tuple[list[Path], list[Path], Stamps]:

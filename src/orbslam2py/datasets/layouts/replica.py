@@ -39,7 +39,7 @@ class ReplicaSequence(DepthSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence."""
+        """Return whether a folder is such a sequence."""
         results = folder / "results"
         return results.is_dir() and any(_NAME.fullmatch(p.name) for p in results.glob("frame*"))
 

@@ -63,7 +63,7 @@ def check_imu(
     paths
         Of the camera, one per map; scales do not matter.
     settings
-        What is believed of the IMU, for the camera that the paths are of; None if nothing is.
+        Assumed settings of the IMU, for the camera of the paths; None if nothing is.
     reach
         Time offsets [s] that are tried, before and after that of the settings.
     """
@@ -114,7 +114,7 @@ def _fitted(
     believed: float,
     reach: float,
 ) -> RateFit | None:
-    """Compare from pose to pose, and for slow motion over longer intervals, if that tells more."""
+    """Compare from pose to pose, or over longer intervals if slow motion makes these more exact."""
     rates = fit_rates(camera, gyro, believed, reach, _STEPS)
     if rates is None or rates.offset_deviation < _SLOW:
         return rates
@@ -191,7 +191,7 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
 
 
 def _check_following(report: ImuReport, rates: RateFit) -> bool:
-    """Whether the gyro follows the camera well enough to tell axes and clock."""
+    """Whether the gyro agrees with the camera well enough to determine axes and clock."""
     if rates.explained >= _EXPLAINED and rates.camera_rms > 0.5 * _TURNING:
         return True
     damaged = any(fault.kind in ("dead", "swapped") for fault in report.faults)

@@ -198,7 +198,7 @@ TERMS = {
     "loops closed": "how often the camera came back to a place and the drift was taken out",
 }
 
-#: What the stages of tracking are.
+#: Descriptions of the stages of tracking.
 STAGES = {
     "extract": "extracting features",
     "stereo": "stereo matching, or depth of keypoints",
@@ -207,7 +207,7 @@ STAGES = {
     "keyframe": "deciding about and making a keyframe; beginning a map, or doubting a young one",
 }
 
-#: What the stages beside tracking are.
+#: Descriptions of the stages beside tracking.
 STAGES_BESIDE = {
     "mapping": "all of local mapping, for one keyframe",
     "mapping.insert": "taking the keyframe into the map's graph",
