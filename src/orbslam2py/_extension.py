@@ -76,8 +76,8 @@ def load() -> ModuleType:
         # Loading it would end the program by an illegal instruction.
         raise ImportError(
             f"This processor lacks {', '.join(lacking)}, which orbslam2py uses (x86-64-v2).\n"
-            "Use a machine with a processor of 2009 or later, or tell the virtual machine to pass "
-            "its host's processor on.",
+            "Use a machine with a processor of 2009 or later, or configure the virtual machine "
+            "to use its host's processor.",
             name=NAME,
         )
     try:

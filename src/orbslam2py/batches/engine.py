@@ -259,8 +259,8 @@ class _Handed:
     def _require_scheduler(self) -> None:
         if self._client.status in ("closing", "closed"):
             raise DatasetError(
-                "the scheduler was lost; start it again, and go on with --resume: what was "
-                "finished is kept"
+                "the scheduler was lost; start it again, and continue with --resume: finished "
+                "runs are kept"
             )
 
 

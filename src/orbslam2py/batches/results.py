@@ -78,7 +78,8 @@ class Results:
                 )
         elif not resume:
             raise DatasetError(
-                f"{self.address} holds a batch already; go on with --resume, or give another folder"
+                f"{self.address} holds a batch already; continue with --resume, or give another "
+                "folder"
             )
 
     def begin(self) -> None:

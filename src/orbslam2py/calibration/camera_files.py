@@ -357,7 +357,7 @@ def _with_baseline(path: Path, settings: Settings, baseline: float | None) -> Se
             )
         return settings
     if likely:
-        raise SettingsError(f"{path} tells the baseline, {found:.4g} m; leave --baseline out")
+        raise SettingsError(f"{path} contains the baseline, {found:.4g} m; leave --baseline out")
     if settings.right is not None:
         T = settings.right.T_left_right.copy()
         T[:3, 3] *= baseline / found

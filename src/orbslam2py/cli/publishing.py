@@ -38,8 +38,8 @@ PublishOption = Annotated[
 BaseFrameOption = Annotated[
     str | None,
     typer.Option(
-        help="Frame of the robot that is published; /tf_static or --base-transform tells where the "
-        "camera is in it [base_link].",
+        help="Frame of the robot that is published; /tf_static or --base-transform gives the pose "
+        "of the camera in it [base_link].",
         metavar="NAME",
     ),
 ]
@@ -66,8 +66,8 @@ FoxglovePort = Annotated[
 FoxgloveHost = Annotated[
     str | None,
     typer.Option(
-        help="Address for Foxglove's app [127.0.0.1: this computer only]. Whoever can reach "
-        "another one sees the images.",
+        help="Address for Foxglove's app [127.0.0.1: this computer only]. Everyone who can "
+        "reach another address sees the images.",
         metavar="ADDRESS",
     ),
 ]

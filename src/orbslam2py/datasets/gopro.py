@@ -99,8 +99,8 @@ def read_gopro_imu(path: str | Path) -> ImuSamples | None:
         return None
     if not ordered:
         _log.warning(
-            "%s does not tell the order of the axes of its IMU; they are as recorded: see which "
-            "fit with 'orbslam2py check-imu'",
+            "%s does not contain the order of the axes of its IMU; they are used as recorded: "
+            "check them with 'orbslam2py check-imu'",
             path,
         )
     gyro, accel = (np.concatenate(streams[name]) for name in (b"GYRO", b"ACCL"))

@@ -193,7 +193,7 @@ READABLE_SAMPLES = (
     ),
     ReadableImu(
         "GoPro",
-        "The track GPMF of the MP4 file; axes in the order that `ORIN` tells.",
+        "The track GPMF of the MP4 file; axes in the order of `ORIN`.",
         "GX010001.MP4",
     ),
     ReadableImu(

@@ -67,7 +67,7 @@ def recognise(folder: str | Path) -> Layout | str:
         raise _several(folder, list(map(str, found)))
     if found:
         return found[0]
-    message = f"{folder} is no sequence we know: looked for {_MARKS}"
+    message = f"{folder} is no known sequence: looked for {_MARKS}"
     inner = sorted(child for child in folder.iterdir() if child.is_dir() and _layouts(child))
     if inner:
         message += f"; did you mean {inner[0]}?"

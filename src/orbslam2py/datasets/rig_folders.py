@@ -79,7 +79,7 @@ class RigFolders(UnlistedSequence):
 
     layout = "images of a rig"
     _missing_calibration = (
-        "nothing tells how the cameras are mounted; give --settings with the file of a rig"
+        "the poses of its cameras are unknown; give --settings with the file of a rig"
     )
 
     def __init__(

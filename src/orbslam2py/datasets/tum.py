@@ -70,8 +70,8 @@ class TumSequence(RecordedSequence):
     layout = Layout.TUM
     up_in_truth = np.array([0.0, 0.0, 1.0])  # the motion capture system stands upright
     _missing_calibration = (
-        "its name does not tell the camera; for TUM RGB-D give --settings tum1 (if the sequence "
-        "was named freiburg1 there), tum2 (freiburg2) or tum3 (freiburg3)"
+        "its name does not identify the camera; for TUM RGB-D give --settings tum1 (if the "
+        "sequence was named freiburg1 there), tum2 (freiburg2) or tum3 (freiburg3)"
     )
 
     def __init__(

@@ -286,7 +286,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
             return stamps_of_seconds(seconds)
         if not self._reader.fps:
             raise DatasetError(
-                f"video {self.path} tells neither time stamps nor a frame rate; give --fps"
+                f"video {self.path} contains neither time stamps nor a frame rate; give --fps"
             )
         _log.warning(
             "the time stamps of %s do not grow; taking a constant %g frames per second",

@@ -266,7 +266,7 @@ def _network_camera(url: str, request: Request) -> CaptureDevice:
         lambda: cv2.VideoCapture(url, cv2.CAP_FFMPEG, timeouts),
         lambda: (
             f"{shown} cannot be opened; see whether the camera is on, whether a player such as "
-            "VLC opens the address, and whether it wants a name and a password: "
+            "VLC opens the address, and whether it needs a name and a password: "
             "rtsp://NAME:PASSWORD@HOST/PATH"
         ),
         request,

@@ -155,7 +155,7 @@ class DeviceClock:
             jump = stamp + self._shifts[last.epoch] - expected
             direction = "ahead" if jump > 0 else "back"
             self._report(
-                f"has a clock that jumped {direction} by {abs(jump):.3g} s; the times go on "
+                f"has a clock that jumped {direction} by {abs(jump):.3g} s; the times continue "
                 "without the jump"
             )
         self._shifts.append(expected - stamp)

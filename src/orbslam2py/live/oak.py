@@ -313,7 +313,7 @@ def _information(name: str, address: str) -> Any:
         )
     raise DatasetError(
         f"{name} is not there: no OAK camera is plugged in or in the network; plug it into a USB 3 "
-        "port; 'orbslam2py devices' lists what is found"
+        "port; 'orbslam2py devices' lists connected cameras"
     )
 
 

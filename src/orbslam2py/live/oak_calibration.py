@@ -74,7 +74,7 @@ def settings_of(
             left = _info(calibration, name, LEFT, size)
             settings = settings_of_camera(left, kind, fps, rectified=False, depth_factor=None)
     except RuntimeError as error:  # error of the library if the memory of the camera is empty
-        raise DatasetError(f"{name} tells no calibration ({error}); {_ADVICE}") from error
+        raise DatasetError(f"{name} has no calibration ({error}); {_ADVICE}") from error
     return replace(settings, camera=replace(settings.camera, rgb=False))
 
 
@@ -123,5 +123,5 @@ def _info(
     )
     info = CameraInfo.of(message, what)
     if info is None:
-        raise DatasetError(f"{what} tells no calibration; {_ADVICE}")
+        raise DatasetError(f"{what} has no calibration; {_ADVICE}")
     return info

@@ -322,7 +322,7 @@ def _find(name: str, serial: str) -> Any:
         )
     raise DatasetError(
         f"{name} is not there: no RealSense camera is plugged in; plug it into a USB 3 port; "
-        "'orbslam2py devices' lists what is found"
+        "'orbslam2py devices' lists connected cameras"
     )
 
 

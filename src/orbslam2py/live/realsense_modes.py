@@ -254,7 +254,7 @@ def _info(name: str, one: Profile) -> CameraInfo:
     info = CameraInfo.of(message, f"{name} ({one.stream})")
     if info is None:
         raise DatasetError(
-            f"{name} tells no calibration of its {one.stream} images; give --settings with a file"
+            f"{name} has no calibration of its {one.stream} images; give --settings with a file"
         )
     return info
 

@@ -98,7 +98,7 @@ def choose_base(
     if told is None:
         told = pose_of_forward_camera()
         _log.warning(
-            "nothing tells where the camera is on the robot: %s is assumed to be at the camera, "
+            "the pose of the camera on the robot is unknown: %s is assumed to be at the camera, "
             "which looks forward; give --base-transform, or publish /tf_static",
             base,
         )

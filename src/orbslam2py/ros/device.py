@@ -313,5 +313,6 @@ def _imu_topics(name: str, gathered: Gathered, named: str) -> dict[str, Topic]:
             f"{title}: nothing is published as {IMU}; start the node of the IMU, or leave out --imu"
         )
     raise DatasetError(
-        f"{title}: cannot tell which of {listed} is the IMU; name it: --topics imu={topics[0].name}"
+        f"{title}: cannot decide which of {listed} is the IMU; name it: --topics "
+        f"imu={topics[0].name}"
     )

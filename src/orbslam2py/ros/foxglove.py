@@ -86,7 +86,7 @@ class FoxgloveTransport:
                 self.where,
                 ""
                 if serving.host == LOOPBACK
-                else ". Whoever can reach this address sees the images",
+                else ". Everyone who can reach this address sees the images",
             )
         else:
             self.where = str(file)

@@ -325,7 +325,7 @@ def _settings_for(source: object, choice: Settings | str | Path | None) -> Setti
     sensor = getattr(source, "sensor", None)
     if sensor is None and isinstance(choice, str | Path):
         raise SettingsError(
-            f"{shown(source)} does not tell its sensor, which settings of a file or a name are "
-            f"read for; give Settings.load({str(choice)!r}, sensor)"
+            f"{shown(source)} does not name its sensor, which is needed to read settings from a "
+            f"file or by a name; give Settings.load({str(choice)!r}, sensor)"
         )
     return resolve_settings(choice, sensor or Sensor.MONOCULAR)

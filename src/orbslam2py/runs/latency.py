@@ -12,7 +12,7 @@ LATENCY_STAGES = {
     "latency.queue": "waiting for the frame before, and for samples of the IMU",
     "latency.prepare": "rectifying and converting",
     "latency.track": "tracking",
-    "latency.total": "all of them; from the arrival if the camera does not tell the exposure",
+    "latency.total": "all of them; from the arrival if the camera does not give the exposure",
 }
 
 

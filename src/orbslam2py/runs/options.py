@@ -129,11 +129,11 @@ class RunOptions:
         if self.localize_after == 0 and self.load_map is None:
             raise DatasetError(
                 "--localize needs a map from the beginning: load one with --load (load_map), or "
-                "say after how many frames the map is to stay as it is (localize_after)"
+                "say after how many frames the map is fixed (localize_after)"
             )
         if self.final_adjustment and self.localize_after is not None:
             raise DatasetError(
-                "--final-adjustment changes the map, which --localize leaves as it is; leave out "
+                "--final-adjustment changes the map, but --localize keeps it unchanged; leave out "
                 "one of them (final_adjustment, localize_after)"
             )
         if self.initial_pose is not None and self.load_map is None:

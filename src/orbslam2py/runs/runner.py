@@ -170,7 +170,7 @@ class SequenceRunner:
             result.interrupted = stop.is_set() and not result.is_live
             if result.interrupted:
                 seen = f"{len(result.rows)} of {result.n_frames} frames"
-                _log.warning("interrupted; saving what was done so far (%s)", seen)
+                _log.warning("interrupted; saving the results so far (%s)", seen)
             self._shut_down(system)
         self._save_map(system)
         result.warnings += getattr(result.sequence, "doubts", ())  # logged when it was opened

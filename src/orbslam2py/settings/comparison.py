@@ -52,7 +52,7 @@ def compare_calibrations(
     return Misfit(
         "; ".join(seen),
         f"settings of {whose}{images}",
-        "leave the settings out to take what comes with the images"
+        "leave the settings out to use those of the images"
         + (f", or give {right}" if right and right != used else ""),
     )
 

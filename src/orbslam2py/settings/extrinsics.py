@@ -63,8 +63,8 @@ def checked_extrinsics(T: object, name: str) -> FloatArray:
     pose = rigid_transform(T, name)
     if not pose[:3, 3].any():
         raise SettingsError(
-            "the two cameras of the pair stand in one place, so they see no depth; look at where "
-            "their calibration puts them, or use one of them (--sensor mono)"
+            "the two cameras of the pair have the same position, so they measure no depth; "
+            "check where their calibration puts them, or use one of them (--sensor mono)"
         )
     return pose
 

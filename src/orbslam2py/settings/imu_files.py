@@ -142,9 +142,9 @@ def _settings_of(statements: _Statements, noise: ImuNoise | None, source: str) -
     if "T_ci" not in values:
         if "T_bc" not in values:
             raise SettingsError(
-                f"{source}: no key tells where the IMU stands beside the camera; add IMU.T_b_c1 "
-                "(ORB-SLAM3), or the file that has T_cam_imu (Kalibr's camchain) or the camera's "
-                "T_BS (EuRoC's cam0/sensor.yaml)"
+                f"{source}: no key gives the pose of the IMU relative to the camera; add "
+                "IMU.T_b_c1 (ORB-SLAM3), or the file that has T_cam_imu (Kalibr's camchain) or "
+                "the camera's T_BS (EuRoC's cam0/sensor.yaml)"
             )
         values["T_ci"] = np.linalg.inv(values["T_bc"]) @ values.get("T_bi", np.eye(4))
     fields = (*_NOISE, "T_ci", "time_offset", "rate")
@@ -252,8 +252,9 @@ def _of_kalibr(path: Path, text: str) -> _Statements:
                 statements[name] = _Stated(_plain(where, values[key], name), where)
     if not statements:
         raise SettingsError(
-            f"{path} tells nothing about an IMU; give settings of ORB-SLAM3 with IMU.*, Kalibr's "
-            "imu.yaml and camchain with T_cam_imu, EuRoC's sensor.yaml or Basalt's calibration"
+            f"{path} contains nothing about an IMU; give settings of ORB-SLAM3 with IMU.*, "
+            "Kalibr's imu.yaml and camchain with T_cam_imu, EuRoC's sensor.yaml or Basalt's "
+            "calibration"
         )
     return statements
 

@@ -131,7 +131,7 @@ def checked_rig(cameras: Sequence[RigCamera]) -> tuple[RigCamera, ...]:
     if not any(source.has_depth for source in depth_sources(rig)):
         raise SettingsError(
             "no camera of the rig has depths: no two views overlap, and none has depth images, so "
-            "that nothing tells lengths. Check the extrinsics (T_c1_c2: from camera 2 to camera 1, "
+            "the scale is unknown. Check the extrinsics (T_c1_c2: from camera 2 to camera 1, "
             "metres; a calibration may give the inverse), say which cameras deliver depth images "
             "(Camera1.depth: 1), or track one camera with --sensor mono"
         )

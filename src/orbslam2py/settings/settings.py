@@ -149,7 +149,7 @@ class Settings:
         if self.rectification is not None:
             raise SettingsError(
                 "rectification and right are both given; a pair is rectified, or has a right "
-                "camera that is matched as it is: keep one"
+                "camera whose images are matched without rectification: keep one"
             )
         bf = self.right.baseline * self.camera.pixels_per_radian
         object.__setattr__(self, "camera", replace(self.camera, bf=bf))

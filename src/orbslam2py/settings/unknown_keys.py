@@ -52,8 +52,8 @@ def problem_of_unknown_key(entry: Entry) -> str | None:
         return f"unknown key {entry.key}; {_advice(meant, entry)}"
     if of_camera:
         return (
-            f"unknown key {entry.key}, which by its name describes the camera, so it is not read "
-            "past; give what it says by a key of orbslam2py ('orbslam2py settings show tum1' "
+            f"unknown key {entry.key}, which by its name describes the camera, so it is not "
+            "ignored; express it by a key of orbslam2py ('orbslam2py settings show tum1' "
             "prints a complete file), or, if it changes nothing about the images, begin the line "
             "with #"
         )

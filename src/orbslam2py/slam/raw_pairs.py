@@ -25,9 +25,9 @@ _NOISE = 0.5
 _MOST_BITS, _MOST_ROWS = 50, 15.0
 _TEXT = (
     "the pairs come rectified already: the rows of their points differ by {given:.1f} pixels, and "
-    "by {rectified:.1f} after rectification by the settings; they are tracked as they are. Give "
-    "the raw images of both cameras, or settings without the calibration of the raw ones (LEFT.*, "
-    "RIGHT.*, Camera2.*)"
+    "by {rectified:.1f} after rectification by the settings; they are tracked without "
+    "rectification. Give the raw images of both cameras, or settings without the calibration of "
+    "the raw ones (LEFT.*, RIGHT.*, Camera2.*)"
 )
 
 #: Features of both images of a grey pair.

@@ -86,8 +86,8 @@ class RigCheck:
         if by_inverse > _CLEARLY_MORE * max(n_depths / frames, 5):
             self.warning = (
                 f"{found}; by the inverse extrinsics it finds {by_inverse}: Camera2.T_c1_c2 maps "
-                "coordinates of camera 2 into those of camera 1, and so on; give the inverse of "
-                "what you have"
+                "coordinates of camera 2 into those of camera 1, and so on; give the inverse "
+                "transforms"
             )
         else:
             self.warning = (

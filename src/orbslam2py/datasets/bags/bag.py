@@ -220,7 +220,7 @@ def _listed_files(folder: Path, doubts: list[str]) -> list[Path]:
         found = _files_in(folder)
         if not found:
             raise DatasetError(
-                f"{path} is damaged, and no bag lies beside it; copy the folder anew"
+                f"{path} is damaged, and no bag lies beside it; copy the folder again"
             ) from error
         doubts.append(f"{path} is damaged; all bags in the folder are taken")
         return found

@@ -102,7 +102,7 @@ def naming_damage(path: Path) -> Iterator[None]:
         raise DatasetError(f"{path}: {error}") from error
     except _DAMAGE as error:
         raise DatasetError(
-            f"{path} is damaged: a part of it is not what its format says; copy it anew"
+            f"{path} is damaged: a part of it is not what its format says; copy it again"
         ) from error
 
 

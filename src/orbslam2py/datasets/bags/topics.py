@@ -304,7 +304,7 @@ class TopicChoice:
     def _require_images(self) -> None:
         path, topics = self._bag.path, [topic for topic in self._bag.topics if topic.n]
         if not topics:
-            raise DatasetError(f"{path} holds no messages; record it anew")
+            raise DatasetError(f"{path} holds no messages; record it again")
         if any(_has_images(topic) for topic in topics):
             return
         pictures = [topic for topic in topics if "Image" in topic.kind]
@@ -329,8 +329,9 @@ class TopicChoice:
         listed = "".join(f"\n  {one}" for one in self._all)
         example = ",".join(f"{role}={topic}" for role, topic in self._examples(roles).items())
         return DatasetError(
-            f"cannot tell which topics of {self._bag.path} are {what}; these have images, of type, "
-            f"pixels and number:{listed}\nname them with --topics, for example --topics {example}"
+            f"cannot decide which topics of {self._bag.path} are {what}; these have images, of "
+            f"type, pixels and number:{listed}\nname them with --topics, for example --topics "
+            f"{example}"
         )
 
     def _examples(self, roles: tuple[str, ...]) -> dict[str, str]:

@@ -274,7 +274,7 @@ def _check_axes(
             report.blame(
                 "axes",
                 "the gyro is mirrored: one or all of its axes have the wrong sign; correct the "
-                "sign, or give --imu-settings, which tells which one",
+                "sign, or give --imu-settings, which contains the axes",
             )
             return None
         report.notes.append(f"rotation from IMU to camera: {_matrix_text(rates.R)}")
@@ -338,7 +338,7 @@ def _other_axes(
         report.blame(
             "rotation",
             "the gyro does not turn as the camera with the rotation of the settings; turn about "
-            "all axes, so that the right one can be told",
+            "all axes, so that the right one can be determined",
         )
         return None
     report.blame(

@@ -111,15 +111,15 @@ def place_by_points(contents: MapContents, positions: FloatArray, known: FloatAr
         )
     if len(positions) < _FEWEST:
         raise MapFileError(
-            f"{len(positions)} known points do not tell how the map lies; give at least {_FEWEST}, "
-            "not on one line"
+            f"{len(positions)} known points do not determine the pose of the map; give at least "
+            f"{_FEWEST}, not on one line"
         )
     placement = _place(contents, positions, known)
     if placement.on_a_line:
         thin = "the map" if _is_thin(_spread(positions)) else "the world"
         raise MapFileError(
-            f"the known points lie on a line in {thin}, so how far the map is turned around it is "
-            "not known; give another one, well beside the line"
+            f"the known points lie on a line in {thin}, so the rotation about the line is not "
+            "determined; give another one, well beside the line"
         )
     return placement
 

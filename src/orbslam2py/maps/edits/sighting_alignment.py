@@ -216,8 +216,8 @@ def _check_share(counts: list[int]) -> None:
     n = sum(counts)
     if n and counts[0] < _LEAST_ALIGNED * n:
         raise DatasetError(
-            f"only {counts[0]} of {n} sightings look alike in these images, so they show something "
-            "else than the map; give the sequence that the map was made of"
+            f"only {counts[0]} of {n} sightings look alike in these images, so they do not "
+            "show the map; give the sequence that the map was made of"
         )
 
 

@@ -240,8 +240,8 @@ def _notes(report: dict[str, Any]) -> Markup | None:
     own_unit = report.get("sensor") == "mono" and not metric
     if own_unit and report.get("tracked") and not report.get("ate_scale"):
         said.append(
-            "Lengths are in the map's own units: a single camera cannot see metres, and no ground "
-            "truth tells them."
+            "Lengths are in the map's own units: a single camera cannot measure metres, and "
+            "there is no ground truth."
         )
     if not said:
         return None

@@ -214,7 +214,7 @@ def _check_number(file: Path, found: int, noun: str, told: Any) -> None:
     """Check that a file is as long as the report says; older reports may not say it."""
     if isinstance(told, int) and told != found:
         raise DatasetError(
-            f"{file} holds {number_of(found, noun)}, but report.json tells of {told}: it is cut, "
+            f"{file} holds {number_of(found, noun)}, but report.json has {told}: it is cut, "
             "or of another run; run the sequence again"
         )
 

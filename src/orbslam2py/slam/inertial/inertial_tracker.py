@@ -266,8 +266,8 @@ class InertialTracker:
         self._take_over(frame)
         if self._n_contradictions >= _CONTRADICTIONS:
             _log.warning(
-                "the IMU contradicts %d images in a row; it starts anew (orbslam2py check-imu "
-                "tells whether it fits the camera)",
+                "the IMU contradicts %d images in a row; it starts again (orbslam2py check-imu "
+                "checks whether it fits the camera)",
                 self._n_contradictions,
             )
             self.forget()
