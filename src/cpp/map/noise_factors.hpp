@@ -8,9 +8,9 @@
 namespace orbslam {
 
 /// Ratio of two noises: the standard deviation of aligned pixels, divided by that of corners of the
-/// same pyramid level. It begins at 1, and a single camera keeps 1. Each measurement moves it a
-/// little (exponential mean of the logarithm). Any thread may read without a lock; one thread
-/// writes.
+/// same pyramid level. It begins at 1, with depths at 0.2; a single camera keeps 1. Each
+/// measurement moves it a little (exponential mean of the logarithm). Any thread may read without a
+/// lock; one thread writes.
 class NoiseFactor {
  public:
   double value() const { return value_.load(std::memory_order_relaxed); }

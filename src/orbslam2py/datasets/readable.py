@@ -51,7 +51,7 @@ READABLE_LAYOUTS = (
     ReadableLayout(
         "KITTI raw",
         "mono, stereo",
-        "A drive as it is unpacked, with the calibration in the folder of its day.",
+        "An unpacked drive, with the calibration in the folder of its day.",
         "2011_09_26/2011_09_26_drive_0001_sync/image_00/data  2011_09_26/calib_cam_to_cam.txt",
         (Layout.KITTI_RAW,),
     ),

@@ -329,7 +329,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
     ForeignFormat(
         "numbers",
         "the numbers of a camera",
-        "scripts of one's own, RealSense tools: JSON or YAML",
+        "your own scripts, RealSense tools: JSON or YAML",
         "One camera of fx, fy, cx, cy (or a camera matrix) and its coefficients; a fisheye with "
         "its model, such as fisheye or ds.",
         _is_numbers,
