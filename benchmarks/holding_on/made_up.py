@@ -175,7 +175,7 @@ class MadeUpCase:
 
     @property
     def key(self) -> str:
-        """All that tells it from other runs."""
+        """Key that identifies the run."""
         return f"{self.situation} | {self.sensor} | {self.features} | {self.seed}"
 
     def options(self) -> SyntheticOptions:
