@@ -41,7 +41,7 @@ class Turn:
 
     @contextlib.contextmanager
     def lent(self) -> Iterator[None]:
-        """A step enters it around callbacks of users, which may wait for other callers."""
+        """Leave the turn during a user's callback, which may wait for other callers."""
         me = threading.get_ident()
         with self._condition:
             depth = self._depth if self.owner == me else 0

@@ -13,8 +13,8 @@ namespace orbslam {
 /// Source of the position of an observation.
 enum class ObservationKind : std::uint8_t {
   kKeypoint,      ///< the corner
-  kAligned,       ///< the patch of the point; its right column has the noise of the corner
-  kAlignedRight,  ///< the same, and the right column was aligned as well
+  kAligned,       ///< alignment of the patch; the right column has the noise of the corner
+  kAlignedRight,  ///< alignment of the patch, also in the right image
   kReference,     ///< the corner from which the patch was cut
 };
 

@@ -200,8 +200,8 @@ class KeyframeConfig:
     inliers: int = 15
     """A keyframe needs more inliers than this (ORB-SLAM)."""
     spacing_with_depth: int = 2
-    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is not
-    weak; with a single camera it is one."""
+    """Least number of frames from one keyframe to the next with stereo and RGB-D, unless tracking
+    is weak. With a single camera it is 1."""
 
 
 @dataclass(frozen=True)

@@ -175,7 +175,7 @@ class Tracking:
         return self._state.n_relocalizations
 
     def feature_factor(self, *, localize: bool) -> int:
-        """Features that a single camera's next image needs, in multiples of the settings'.
+        """Factor on the number of features in the settings, for a single camera's next image.
 
         In localization mode no other thread needs the processor, and more features match more of
         the map. The same holds for a camera that is lost, or nearly lost. But more features are
