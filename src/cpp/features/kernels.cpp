@@ -22,7 +22,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// As many pixels as there is room for, and half as many numbers twice as long.
+/// Vector types: 8-bit pixels that fill a vector, and half as many 16-bit numbers.
 using Pixels = hn::ScalableTag<std::uint8_t>;
 using PixelVector = hn::Vec<Pixels>;
 using Words = hn::ScalableTag<std::int16_t>;

@@ -48,7 +48,7 @@ class Chunks {
     png ? skip(kSignature.size()) : skip(left_);
   }
 
-  /// Nothing at the end of the file, or where it is broken.
+  /// None at the end of the file, or at a damaged chunk.
   std::optional<Chunk> next() {
     if (left_ < kChunkFrame) return std::nullopt;
     const std::size_t size = big_endian(at_);
