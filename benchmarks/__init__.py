@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is measured, and beside what.
+"""The measurements, and their references.
 
 Programs are started as ``python -m benchmarks.FOLDER.NAME`` in the checkout; all have ``--help``.
 """

@@ -48,7 +48,7 @@ def _layouts() -> str:
     return (
         "## Images\n\n`orbslam2py run PATH` recognises the layout by its files.\n\n"
         + _table(head, rows)
-        + "\n\nA package can add a layout of its own: "
+        + "\n\nA package can add its own layout: "
         "[Your own data set](../guide/own-dataset.md)."
     )
 

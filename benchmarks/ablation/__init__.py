@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What each mechanism beyond the published method gives: see `benchmarks.ablation.__main__`."""
+"""The effect of each mechanism beyond the published method: see `benchmarks.ablation.__main__`."""

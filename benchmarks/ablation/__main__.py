@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What each mechanism beyond the published method gives.
+"""Effect of each mechanism beyond the published method.
 
 Each mechanism is switched off through the configuration and the same runs are played: made-up
 worlds with hard motions, recorded sequences made harder, and the drive around the block. The
 table has differences from the full method, paired by run, with 95 % intervals over runs.
-What has been played stands in one CSV file per variant, and is not played again.
+Finished runs are in one CSV file per variant, and are not repeated.
 
     python -m benchmarks.ablation --runs 300 --jobs 2
     python -m benchmarks.ablation --part recorded --runs 62

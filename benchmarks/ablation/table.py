@@ -23,7 +23,7 @@ def _sum_of(name: str) -> Callable[[Row], float]:
 
 #: Counts of a run, in the order of the table.
 COUNTS: dict[str, Callable[[Row], float]] = {
-    "wrong,\nbelieved": _sum_of("wrong"),
+    "wrong,\nundetected": _sum_of("wrong"),
     "final path\noff": _sum_of("path_off"),
     "not\ntracked": lambda row: float(row["trackable"] - row["tracked"]),
     "losses\nnot found": lambda row: float(row["losses"] - row["found"]),

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How exact: trajectories, poses found again, places told apart."""
+"""How exact: trajectories, relocalization, place recognition."""

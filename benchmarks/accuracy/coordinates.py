@@ -45,7 +45,7 @@ class Errors:
 
     ate: float
     shape: float
-    """ATE of the path with a scale of its own."""
+    """ATE of the path after an alignment with scale."""
     length: float
     """By how much of it the path is too long [percent]."""
     step: float
@@ -117,7 +117,7 @@ def rows_of(name: str, begun: list[tuple[Sequence, int]]) -> Iterator[tuple[str,
     name : str
         Of the sequences.
     begun : list of Sequence, int
-        What is run, and from which frame.
+        The sequence, and its first frame.
     """
     medians = []
     sequence = begun[0][0]

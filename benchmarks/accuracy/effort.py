@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What each effort gives: error against time, over how often frames become keyframes.
+"""Results of each effort: error against time, over how often frames become keyframes.
 
 Every sequence with ground truth, recorded and made up, with threads and in the deterministic mode,
 several times from different first frames and with different seeds. Efforts take turns, so that they
@@ -112,7 +112,7 @@ def table_of(n_starts: int) -> Table:
 def main() -> None:
     """Run all and print a table."""
     parser = new_parser(__doc__)
-    add_counts(parser, starts=(3, "first frames, each with a seed of its own"))
+    add_counts(parser, starts=(3, "first frames, each with another seed"))
     parser.add_argument("--recorded-only", action="store_true", help="no made-up sequences")
     parser.add_argument("--modes", nargs="+", choices=MODES, default=list(MODES), help="[all]")
     parser.add_argument("--only", default="", metavar="TEXT", help="sequences with it in the name")

@@ -112,7 +112,7 @@ def comparisons(n_starts: int, *, made_up: bool) -> Iterator[Comparison | None]:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    add_counts(parser, starts=(5, "first frames, each with a seed of its own"))
+    add_counts(parser, starts=(5, "first frames, each with another seed"))
     parser.add_argument("--recorded-only", action="store_true", help="no made-up sequences")
     add_width(parser)
     arguments = parser.parse_args()

@@ -25,7 +25,7 @@ class MappedWorld:
 
     def __init__(self, sequence: SyntheticSequence, frames: Iterable[int], seed: int = 0) -> None:
         self.sequence = sequence
-        # Whatever is shown, it is searched in this map alone.
+        # All images are searched in this map only.
         self.system = System(
             sequence.settings, sequence.sensor, deterministic=True, seed=seed, several_maps=False
         )

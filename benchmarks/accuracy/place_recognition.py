@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How well vocabularies tell places apart: every image asks, the L1 score ranks all others.
+"""How well vocabularies distinguish places: every image asks, the L1 score ranks all others.
 
 Recall at precision 1 is the share of the right pairs whose score is above that of every wrong pair;
 average precision is the area under the precision-recall curve over all pairs.
@@ -112,7 +112,7 @@ def main() -> None:
         corridor_places(sequence_folder("rtabmap_samples_loop")),
     ]
     table = new_table(
-        "Places told apart",
+        "Place recognition",
         ["images", "right pairs", "vocabulary", "words"],
         ["recall at precision 1", "average precision", "best match right"],
     )

@@ -4,11 +4,10 @@
     python -m benchmarks.accuracy.relocalization PART
 
     kidnap          to another place, black images between
-    gaps            the camera goes on behind a covered lens, or while images are blurred
-    recall          viewpoints beside the path, other exposure
-    foreign         worlds and photographs never mapped
-    localization    out of the map and back, ten times
-    speed           single attempts, query of a large map
+    gaps            the camera moves behind a covered lens, or while images are blurred recall
+    viewpoints beside the path, other exposure foreign         worlds and photographs never mapped
+    localization    out of the map and back, ten times speed           single attempts, query of a
+    large map
 
 Errors are taken through the nearest mapped keyframe, so that the drift of the map does not count;
 with a single camera lengths are those of the mapped path aligned by Sim(3).
@@ -44,7 +43,7 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticW
 
 #: Both views had enough matches, and a reconstruction was tried.
 ATTEMPTED = {Reason.LOW_PARALLAX, Reason.AMBIGUOUS_MOTION, Reason.DEGENERATE_VIEWS}
-#: Metres: whoever is found farther away was found at another place that looks alike.
+#: Metres: a frame that is found farther away was found at another place that looks alike.
 WRONG = 1.0
 
 
@@ -107,7 +106,7 @@ def kidnap(arguments: argparse.Namespace, sensor: str) -> None:
 
 # ---- gaps ----------------------------------------------------------------------------------------
 def gaps(arguments: argparse.Namespace, sensor: str) -> None:
-    """Behind the mapped part of the path, which goes on while nothing can be seen."""
+    """Places behind the mapped part of the path, reached without visible images."""
     n_gaps, second = arguments.count, 20
     for kind in ("covered", "blurred"):
         for length in (5, 10, 20):
@@ -262,7 +261,7 @@ def report(name: str, milliseconds: list[float], limit: float) -> None:
 
 
 def speed(arguments: argparse.Namespace, sensor: str) -> None:
-    """Of a single camera, whatever the sensor asked for: the others do less."""
+    """Always for a single camera: other sensors need less work."""
     if sensor != "mono":
         return
     sequence = sequence_of(arguments, sensor)

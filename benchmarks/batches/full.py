@@ -137,7 +137,7 @@ def promised_table(folder: Path) -> bytes:
 
 
 def differences(one: Path, other: Path) -> list[str]:
-    """What is not the same of two batches."""
+    """Differences of two batches."""
     found = []
     if promised_table(one) != promised_table(other):
         found.append("results.csv")

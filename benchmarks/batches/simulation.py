@@ -2,9 +2,9 @@
 """A thousand workers by simulation: when the scheduler or a shared disk becomes the limit.
 
 Runs are drawn from a table of runs that were made: seconds on their worker, and megabytes of images
-that they read. A run computes and reads at the same time and ends when both are done. The disk is
-shared evenly by all who read. The scheduler (and the process of the batch) handles one run after
-the other, and gives each worker so many runs beforehand as the engine does.
+that they read. A run computes and reads at the same time and ends when both are done. All readers
+share the disk evenly. The scheduler (and the process of the batch) handles one run after the other,
+and gives each worker so many runs beforehand as the engine does.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _MEASURED_RUNS = 2000
 
 @dataclass(frozen=True)
 class Run:
-    """What a run needs."""
+    """Resources of a run."""
 
     seconds: float
     megabytes: float
@@ -49,7 +49,7 @@ class Outcome:
     scheduler: float
     """Part of the time in which the scheduler was at work."""
     disk: float
-    """Part of the time in which somebody read."""
+    """Share of the time with at least one reader."""
 
     @property
     def efficiency(self) -> float:
@@ -57,7 +57,7 @@ class Outcome:
 
 
 class Disk:
-    """Even shares for all who read: what a reader has got grows equally for all of them."""
+    """Even shares for all readers: what a reader has got grows equally for all of them."""
 
     def __init__(self, megabytes_per_second: float) -> None:
         self._rate = megabytes_per_second
@@ -76,7 +76,7 @@ class Disk:
         heapq.heappush(self._readers, (self._got + megabytes, worker))
 
     def next_end(self) -> float:
-        """When the first of those who read now has all, if nobody else comes."""
+        """Time at which the first of the present readers finishes, without new readers."""
         if not self._readers:
             return float("inf")
         left = max(0.0, self._readers[0][0] - self._got)
@@ -153,7 +153,7 @@ def simulate(
     Parameters
     ----------
     runs
-        What they need.
+        Their resources.
     n_workers
         How many there are.
     seconds_per_run

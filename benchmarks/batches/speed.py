@@ -24,7 +24,7 @@ RUN_SECONDS = 30.0
 
 
 def run_batch(document: dict[str, Any], folder: Path, workers: int) -> tuple[float, list[float]]:
-    """Run a batch anew.
+    """Run a batch from the start.
 
     Returns
     -------

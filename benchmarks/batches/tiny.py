@@ -33,7 +33,7 @@ _LINES = 10
 
 @dataclass
 class Watch:
-    """What was seen after each run."""
+    """Measurements after each run."""
 
     begin: float = field(default_factory=time.perf_counter)
     own: list[float] = field(default_factory=list)

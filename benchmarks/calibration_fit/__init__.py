@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether wrong calibrations are told, and right ones are not."""
+"""Whether wrong calibrations are reported, and right ones are not."""

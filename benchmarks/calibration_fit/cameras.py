@@ -172,7 +172,7 @@ def _rolling_shutter(world: str, seconds: float, name: str) -> Case:
 
 
 def right_cases() -> Iterator[Case]:
-    """Calibrations that fit: nothing may be told."""
+    """Calibrations that fit: no report is allowed."""
     for world in ("corridor", "room", "figure-eight", "two-rooms"):
         for sensor in ("mono", "stereo", "rgbd"):
             yield _as_it_is(f"{world}, {sensor}", _sequence(world, sensor))
@@ -209,7 +209,8 @@ def _hard_scenes(world: str, sensor: str) -> Iterator[Case]:
 
 
 def wrong_cases() -> Iterator[Case]:
-    """Calibrations that do not fit, as data tell or not: the camera turns in the room only."""
+    """Calibrations that do not fit, whether the data show it or not: the camera turns in the room
+    only."""
     for world in ("room", "corridor"):
         for sensor in ("mono", "stereo", "rgbd"):
             case = _as_it_is(f"{world}, {sensor}", _sequence(world, sensor))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which calibrations are told not to fit within the first 49 images.
+"""Which calibrations are reported as wrong within the first 49 images.
 
 Every real sequence with the settings of every other one and with all built-in ones, with and
-without the calibration that comes with it; right calibrations of all kinds, which must not be told;
-and wrong ones on made-up images.
+without the calibration that comes with it; right calibrations of all kinds, which must not be
+reported; and wrong ones on made-up images.
 
     python -m benchmarks.calibration_fit.table matrix
     python -m benchmarks.calibration_fit.table right wrong
@@ -36,7 +36,7 @@ PARTS = ("matrix", "right", "wrong")
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a watch said, and by which figures."""
+    """Report of the check, and its figures."""
 
     name: str
     told: str
@@ -140,8 +140,9 @@ def main() -> None:
         }[part]()
         numbers = ("rows [px]", "focal (gain)", "centre (gain)", "radial (gain)")
         told = sum(bool(one.told) for one in judgements)
-        caption = f"{told} of {len(judgements)} told"
-        table = new_table(f"calibrations: {part}", ("images <- settings", "told"), numbers, caption)
+        caption = f"{told} of {len(judgements)} reported"
+        head = ("images <- settings", "reported")
+        table = new_table(f"calibrations: {part}", head, numbers, caption)
         for one in judgements:
             figures = (one.row_difference, one.focal, one.centre, one.radial)
             table.add_row(one.name, one.told[:40], *figures)

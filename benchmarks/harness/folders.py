@@ -38,7 +38,7 @@ def built(build: Path, name: str) -> Path:
 
 
 def how_to_build(build: Path, *names: str) -> str | None:
-    """Names what is not built, and how to build it; None if all is there."""
+    """Names missing programs, and how to build them; None if all is there."""
     missing = [name for name in names if not built(build, name).is_file()]
     if not missing:
         return None

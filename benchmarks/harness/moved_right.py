@@ -40,7 +40,7 @@ def moved_left(image: ByteArray, pixels: float) -> ByteArray:
 
 
 def with_moved_right_images(folder: Path, pixels: float, copy: Path) -> Path:
-    """A KITTI sequence as it is but for its right images (``image_1``), which are moved left.
+    """A KITTI sequence whose right images (``image_1``) are moved left.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Somebody who looks at the viewer's page and draws nothing."""
+"""A client of the viewer's page that draws nothing."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ with connect(address, subprotocols=[protocol], max_size=None) as page:
 class Onlooker:
     """A process that takes what a browser takes, until the page ends or the block does.
 
-    It runs when nobody else wants to: a browser is at another computer, or has cores to itself.
+    It runs with low priority: a browser is at another computer, or has cores to itself.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Onlooker:
     def _expect(self, word: str) -> None:
         assert self._process.stdout is not None
         if self._process.stdout.readline().strip() != word:
-            raise RuntimeError(f"nobody looked: {self._process.communicate()[1]}")
+            raise RuntimeError(f"the client of the viewer failed: {self._process.communicate()[1]}")
 
     def n_bytes(self) -> int:
         """Bytes that it was sent, once the page has ended.
@@ -94,7 +94,7 @@ class Onlooker:
         """
         printed, complaints = self._process.communicate(timeout=60)
         if not printed.strip().isdigit():
-            raise RuntimeError(f"nobody looked: {complaints}")
+            raise RuntimeError(f"the client of the viewer failed: {complaints}")
         return int(printed)
 
     def __enter__(self) -> Onlooker:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the original ORB-SLAM2 measured, and what is asked of this implementation.
+"""Results of the original ORB-SLAM2, and targets of this implementation.
 
 Measured with the original at commit f2e6f51 (-O3 -march=native, OpenCV 4.6, no viewer) on two
 virtual cores of a Zen 4 server; medians; vocabulary of 825 000 words (branching 10, depth 6). The

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What runs in a process of its own: whole sequences, programs of this package, C++ programs."""
+"""Runs in separate processes: whole sequences, programs of this package, C++ programs."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How well tracking holds on: wrong poses believed, starts, losses, honesty of covariances.
+"""Robustness of tracking: undetected wrong poses, starts, losses, consistency of covariances.
 
 Worlds with motions that are hard to follow are played with the three sensors, 400 to 2000
 features and new seeds, small and deterministic, and every pose is compared with the truth.
 `--part block` drives around 320 m of street with sharp corners, at full size. `--part recorded`
 plays the recorded sequences in ways that are harder than they were: every second to fourth image,
 backwards, images dropped, blurred, darkened, rolled. `--part images` plays easy motions with more
-or less noise, blur and contrast, for the spreads of the errors in stated deviations. What has been played with the present code
-stands in the CSV file and is not played again.
+or less noise, blur and contrast, to compare errors with their stated deviations. Finished runs of
+the present code are in the CSV file and are not repeated.
 
     python -m benchmarks.holding_on --runs 60
     python -m benchmarks.holding_on --runs 1000 --sensors stereo rgbd --jobs 2
@@ -64,7 +64,7 @@ def main() -> None:
     add_sensors(parser)
     parser.add_argument("--only", metavar="TEXT", help="runs with this text in their name")
     parser.add_argument("--csv", type=Path, help="file of all runs [build/holding_on/COMMIT.csv]")
-    parser.add_argument("--again", action="store_true", help="play what is in the file, too")
+    parser.add_argument("--again", action="store_true", help="repeat the runs in the file, too")
     parser.add_argument("--set", nargs="+", metavar="NAME=VALUE", help="configuration", default=[])
     add_width(parser)
     arguments = parser.parse_args()

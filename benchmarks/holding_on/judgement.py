@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run got right and wrong, against the truth."""
+"""Comparison of a run with the ground truth."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SCALE_FRAMES = 10  # on either side, over which the scale of a single camera is
 
 @dataclass(frozen=True)
 class Figures:
-    """What is counted in a run; the names are the columns of the CSV file."""
+    """Counts of a run; the names are the columns of the CSV file."""
 
     frames: int
     lasted: float
@@ -39,12 +39,12 @@ class Figures:
     wrong_keyframes: int
     """Of these keyframes."""
     wrong_before: int
-    """Of these right by where the frame before lies when this one is told: it was adjustment that
+    """Of these, right relative to the present pose of the frame before: it was adjustment that
     moved the map between them."""
     path_compared: int
     """Poses of the last map's final path compared with the frame before."""
     path_off: int
-    """Of these off by more than 0.2 m or 1 degree, whatever was known of it: a path has no
+    """Of these off by more than 0.2 m or 1 degree, whatever its covariance: a path has no
     deviations."""
     losses: int
     """Losses after which a mapped place came into view ..."""
@@ -53,7 +53,7 @@ class Figures:
     left_view: int
     """Of the others, those in which no mapped place was in view for the whole of that second."""
     rotation_spread: float
-    """Spread of the error from frame to frame in units of its stated deviation (1: honest)."""
+    """Spread of the error from frame to frame in units of its stated deviation (1: consistent)."""
     translation_spread: float
     maps: int
     ate: float

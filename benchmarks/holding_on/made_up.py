@@ -189,7 +189,7 @@ class MadeUpCase:
 
     @property
     def key(self) -> str:
-        """All that tells it from other runs."""
+        """Key that identifies the run."""
         world = f" | {self.of.options['world']}" if self.situation in IMAGES else ""
         return f"{self.situation}{world} | {self.sensor} | {self.features} | {self.seed}"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A run, and what is known of every frame of it."""
+"""A run, with the data of every frame."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Played:
     Attributes
     ----------
     scene
-        What was played.
+        The scene of the run.
     truth
         ``T_cw`` of every frame, (n, 4, 4); NaN where not known.
     truth_part
@@ -34,9 +34,11 @@ class Played:
     posed
         Frames with a pose, (n,).
     T_cw
-        Poses as they were told at once, (n, 4, 4); NaN without one.
+        Poses as they were returned for each image, before later corrections, (n, 4, 4); NaN without
+        one.
     motion
-        From the frame before, as that one lies in the map by now, (n, 4, 4); NaN where not known.
+        Motion from the frame before, by its pose in the map at this image, (n, 4, 4); NaN where
+        unknown.
     covariance
         (n, 6, 6) rotation, translation; NaN without one.
     keyframe

@@ -125,7 +125,7 @@ class Blurred(Shown):
     """Four images of every twelve are smeared by 1.5 % of their width."""
 
     def of(self, images: Images, place: int, seconds: float) -> Images:
-        """Smear along a line in a direction of its own."""
+        """Motion blur along a random direction."""
         if place // 4 % 3 != 2:
             return images
         angle = np.random.default_rng((self.seed, place)).uniform(0, np.pi)
@@ -338,7 +338,7 @@ class RecordedCase:
 
     @property
     def key(self) -> str:
-        """All that tells it from other runs."""
+        """Key that identifies the run."""
         about = (self.recording.name, self.change, self.sensor, self.features, self.seed)
         return " | ".join(map(str, about))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of runs in a CSV file, which an interrupted benchmark goes on with, and their table."""
+"""Rows of runs in a CSV file, from which an interrupted benchmark continues, and their table."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def read_rows(path: Path) -> dict[str, Row]:
 
 
 def write_rows(path: Path, rows: Iterable[Row]) -> None:
-    """Write all rows anew: a file that was cut short is whole again."""
+    """Write all rows again: a file that was cut short is whole again."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_write(path) as file:
         writer = csv.DictWriter(file, COLUMNS)
@@ -85,7 +85,7 @@ def motions_table(rows: Iterable[Row], title: str) -> Table:
         [
             "runs",
             "poses\ncompared",
-            "wrong,\nbelieved",
+            "wrong,\nundetected",
             "of these\nkeyframes",
             "the map\nmoved",
             "final path\noff",
@@ -159,7 +159,7 @@ def middle(values: Iterable[float]) -> str:
 def block_table(rows: Iterable[Row], title: str) -> Table:
     """One line a run around the block, and the count of those that are good enough."""
     table = new_table(
-        title, ["seed"], ["tracked of\nframes", "wrong,\nbelieved", "loops", "ATE m", "good"]
+        title, ["seed"], ["tracked of\nframes", "wrong,\nundetected", "loops", "ATE m", "good"]
     )
     good = 0
     rows = [row for row in rows if row["situation"] == BLOCK]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is played, whether it was made up or recorded."""
+"""Input of a run, synthetic or recorded."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def median_angle(first: Floats, second: Floats) -> float:
 
 
 class Scene(Protocol):
-    """Images, and what is known of each.
+    """Images, and the ground truth of each.
 
     Attributes
     ----------

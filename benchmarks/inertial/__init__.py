@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an IMU changes on synthetic sequences: ``python -m benchmarks.inertial``."""
+"""Effect of an IMU on synthetic sequences: ``python -m benchmarks.inertial``."""

@@ -21,7 +21,7 @@ from orbslam2py.slam.records import TrackingState
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.rotations import inverse_poses
 
-#: A fault has to be told so soon after the first pose [s].
+#: A fault must be reported within this time after the first pose [s].
 PATIENCE = 5.0
 RIGHT = "none"
 _FRAMES, _SIZE = 140, (320, 240)
@@ -32,7 +32,7 @@ _SMOOTHED, _REACH = 0.4, 3.0
 
 @dataclass
 class Given:
-    """What a run gets."""
+    """Input of a run."""
 
     samples: FloatArray  # (n, 7)
     settings: ImuSettings
@@ -44,7 +44,7 @@ Change = Callable[[Given, SyntheticSequence, np.random.Generator], None]
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault, and the kinds of finding that tell it rightly."""
+    """A fault, and the kinds of findings that are correct for it."""
 
     name: str
     kinds: frozenset[str]
@@ -54,7 +54,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Told:
-    """What a run said."""
+    """Reports of a run."""
 
     fault: str
     sensor: str
@@ -207,7 +207,7 @@ def _told(fault: Fault, sequence: SyntheticSequence, images: Sequence[Any], seed
 
 def show(rows: Sequence[Told], console: Console) -> None:
     """Print a line for each fault, then every run that was not as it should be."""
-    numbers = ["runs", f"told in {PATIENCE:.0f} s", "kind right", "latest [s]", "called right"]
+    numbers = ["runs", f"reported in {PATIENCE:.0f} s", "kind right", "latest [s]", "called right"]
     table = new_table("faults on purpose", ["fault"], numbers)
     for name in dict.fromkeys(row.fault for row in rows):
         group = [row for row in rows if row.fault == name]

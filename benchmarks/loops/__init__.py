@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Closing loops: how well, at what cost, and tracking meanwhile."""
+"""Closing loops: quality, cost, and tracking during corrections."""

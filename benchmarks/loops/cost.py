@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What closing a loop costs, by size of the map, and what a full adjustment does to tracking.
+"""Cost of a loop closure by the size of the map, and effect of a full adjustment on tracking.
 
 Every step runs in made-up maps of 250 to 10 000 keyframes; the limits of the steps are for
 1000, those of the whole correction and of memory for all sizes. The curve goes to
@@ -103,7 +103,7 @@ def _verification(build: Path) -> list[Step]:
 def _correction(build: Path) -> list[Step]:
     found = benchmark_records(build, "loop_correction_bench", "BM_CorrectLoop/.*monocular:0")
     whole = Step("correction", "processor time; plan, prepare under the read lock, write")
-    lock = Step("correction_lock", "processor time; nobody reads the map meanwhile")
+    lock = Step("correction_lock", "processor time; readers of the map are locked out")
     for n in SIZES:
         record = found[f"BM_CorrectLoop/keyframes:{n}/monocular:0"]
         parts = ("plan", "prepare", "write")

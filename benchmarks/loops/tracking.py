@@ -187,7 +187,7 @@ def tracking_table(found: Measured) -> Table:
         table.add_row(f"track ms {name}: median / p95 / p99", shown, "", "")
         table.add_row(f"track ms {name}: longest", f"{max(times):.1f}", "", "")
     ratio, most = p99[1] / p99[0], reference.ADJUSTMENT_TRACKING_RATIO
-    table.add_row("p99 meanwhile / without", f"{ratio:.2f}", f"{most:g}", verdict(ratio <= most))
+    table.add_row("p99 during / without", f"{ratio:.2f}", f"{most:g}", verdict(ratio <= most))
     limit = (reference.LOOPS["full_adjustment"].limit or 0) / 1e3
     if seconds:
         shown = f"{statistics.median(seconds):.1f} ({max(seconds):.1f})"

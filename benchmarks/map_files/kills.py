@@ -5,8 +5,8 @@
 
 Each run saves or autosaves a growing map again and again until SIGKILL. Afterwards the file is
 missing (the first save had not ended), or it is loaded whole, its invariants hold, and it is at
-least as large as the last commit that the program told of. The programs are forks of this one, so
-that a run costs little more than the time until it is killed; `--first` goes on with earlier runs.
+least as large as the last commit that the program reported. The programs are forks of this one, so
+that a run costs little more than the time until it is killed; `--first` continues earlier runs.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from orbslam2py import _core as core
 from orbslam2py.datasets import Frame
 from orbslam2py.maps import SavedMap, load_map, restore_contents, save_map
 
-#: So many keyframes may have been culled since the last save that was told of.
+#: So many keyframes may have been culled since the last reported save.
 CULLED = 3
 #: Frames of the corridor that are tracked, those of the map to begin with among them.
 FRAMES = 60
@@ -57,7 +57,7 @@ def forked(work: Callable[[int], object]) -> tuple[int, int]:
 
 
 def victim(path: Path, start: SavedMap, frames: list[Frame], how: str, tells: int) -> NoReturn:
-    """Map and save until somebody kills us; tells how many keyframes were saved."""
+    """Map and save until the process is killed; reports the number of saved keyframes."""
     with System(load_map=start, wait_for_mapping=True) as slam:
         if how == "autosave":
             slam.autosave(path, every=0.005)

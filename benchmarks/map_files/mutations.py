@@ -141,7 +141,7 @@ BYTEWISE: tuple[Callable[[bytearray, random.Random], None], ...] = (
 
 
 def check(path: Path, vocabulary: core.Vocabulary) -> str:
-    """Load a spoilt file as a system would: what came of it."""
+    """Load a spoilt file as a system would: the outcome."""
     try:
         contents = load_map(path, images=True).contents
         restored = core.Map()

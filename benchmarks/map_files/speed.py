@@ -122,7 +122,7 @@ def print_autosave(folder: Path, frames: int, n_pairs: int) -> None:
 
 
 def memory_of_load(path: Path) -> None:
-    """Print the memory of a map, and the peak while it was loaded (in a process of its own)."""
+    """Print the memory of a map, and the peak while it was loaded (in a separate process)."""
     vocabulary = load_vocabulary()
     gc.collect()
     before = resident_mb(trimmed=True)

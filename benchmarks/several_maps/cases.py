@@ -23,7 +23,7 @@ COVERED = round(3 * FPS)
 
 
 class DifferentRooms(SyntheticSequence):
-    """The way through `two-rooms`, where the second room has a wallpaper of its own."""
+    """The way through `two-rooms`, where the second room has another wallpaper."""
 
     @cached_property
     def _built(self) -> core.World:
@@ -121,7 +121,7 @@ def _open_lap(n: int) -> Order:
 def _shuffled(n: int, random: np.random.Generator) -> Order:
     """A lap in five pieces that overlap a little, in any order.
 
-    A single camera begins each of them with a scale of its own.
+    A single camera begins each of them with another scale.
     """
     bounds = np.linspace(0, n, 6).astype(int)
     pieces = []

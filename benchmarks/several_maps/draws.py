@@ -4,10 +4,10 @@
     python -m benchmarks.several_maps.draws
     python -m benchmarks.several_maps.draws --draws 8 --frames 200
 
-Every draw has a process, a seed and a sensor of its own; every second one runs with threads. The
-pieces do not overlap, so that maps that are left need not be of one place. A frame is lost if it
-had a pose when it was tracked and has none in the end, or one in two living maps; poses that were
-found again and not confirmed by the next frame do not count.
+Every draw has its own process, seed and sensor; every second one runs with threads. The pieces do
+not overlap, so that maps that are left need not be of one place. A frame is lost if it had a pose
+when it was tracked and has none in the end, or one in two living maps; poses that were found again
+and not confirmed by the next frame do not count.
 
 Exits with 1 if a draw failed, hung, or lost a frame.
 """
@@ -93,7 +93,7 @@ def run(draw: int, frames: int | None) -> Row:
 
 
 def run_apart(draw: int, frames: int | None) -> Row:
-    """One draw in a process of its own, whatever becomes of it."""
+    """One draw in a separate process, with any outcome."""
     command = [sys.executable, "-m", "benchmarks.several_maps.draws", "--draw", str(draw)]
     command += [] if frames is None else ["--frames", str(frames)]
     about = {"pieces": FEWEST + draw % (MOST - FEWEST + 1), "threaded": draw % 2 == 1}

@@ -5,12 +5,13 @@ Every case runs with several seeds; the seed chooses wallpaper, the order of pie
 draws. All but `twin` can end in one map, also those with places that only look alike. The error is
 that of all frames of the largest map, beside that of the same frames in the uncut sequence. Where
 that closes a loop which the pieces leave open, drift is taken out of it that nothing could take
-out of them: their error is judged by that of the same way in one go (*unbroken*). In `twin` nobody
-can tell the places apart by their images: each piece is judged by itself.
+out of them: their error is judged by that of the same way in one go (*unbroken*). In `twin` the
+places cannot be distinguished by their images: each piece is judged by itself.
 
     python -m benchmarks.several_maps.meeting                              all cases, ten seeds
     python -m benchmarks.several_maps.meeting --cases kidnapped --sensors rgbd --seeds 3
-    python -m benchmarks.several_maps.meeting --rows build/meeting.jsonl   goes on where it was
+    python -m benchmarks.several_maps.meeting --rows build/meeting.jsonl   continues an interrupted
+    run
 
 Exits with 1 if a row misses its limits.
 """
@@ -44,7 +45,7 @@ FALSE = 0.5
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one seed."""
+    """Outcome of one seed."""
 
     n_maps: int
     merges: int

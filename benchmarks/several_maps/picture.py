@@ -54,7 +54,7 @@ def maps_of(system: System) -> dict[int, Drawn]:
 
 
 def draw(axes: Axes, drawn: dict[int, Drawn], title: str) -> None:
-    """Draw maps from above, each in a colour of its own."""
+    """Draw maps from above, each in its own colour."""
     for number, one in drawn.items():
         colour = COLOURS[number % len(COLOURS)]
         axes.plot(*one.points.T, ",", color=colour, alpha=0.35)
@@ -107,7 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
     figure = Figure(figsize=(9, 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
-    draw(left, before, "before they met: each in a world of its own")
+    draw(left, before, "before the merge: each in its own world frame")
     draw(right, after, "after: one map, in the world of the older one")
     figure.savefig(given.output, dpi=110)
     print(f"{given.output} is drawn")

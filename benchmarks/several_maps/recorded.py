@@ -4,7 +4,7 @@
     python -m benchmarks.several_maps.recorded
     python -m benchmarks.several_maps.recorded --only redkitchen --seeds 1
 
-Each sequence is run as it is, and
+Each sequence is run uncut, and
 
     kidnapped   the lens is covered for three seconds, then the whole way is gone, through the part
                 that was seen first
@@ -12,8 +12,9 @@ Each sequence is run as it is, and
     black       a stretch of images is black; it is seen at last
     shuffled    in five pieces (three of short sequences) that overlap a little, in any order
 
-A frame can be tracked if it is in the run as it is. Demanded are 95 % of them in the largest map;
-in `jump` those of the time for which only the old map is searched (`new_map_after`) are left out.
+A frame can be tracked if it is tracked in the uncut run. Demanded are 95 % of them in the largest
+map; in `jump` those of the time for which only the old map is searched (`new_map_after`) are left
+out.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ def as_it_is(sequence: Sequence, seed: int) -> Row:
 
 
 def cut(sequence: Sequence, order: Order, whole: Found, seed: int, *, waits: bool) -> Row:
-    """Run a cut version; `whole` is what the run as it is found.
+    """Run a cut version; `whole` is the result of the uncut run.
 
     `waits`: the images go on while only the old map is searched.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of runs in a file, one JSON object a line, which an interrupted benchmark goes on with."""
+"""Rows of runs in a file, one JSON object a line, from which an interrupted benchmark continues."""
 
 from __future__ import annotations
 
@@ -63,6 +63,4 @@ class Rows:
 
 def add_rows(parser: argparse.ArgumentParser) -> None:
     """Option that names the file."""
-    parser.add_argument(
-        "--rows", type=Path, help="file of all runs; those that stand in it are not run again"
-    )
+    parser.add_argument("--rows", type=Path, help="file of all runs; runs in it are not repeated")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What several maps cost: joining two of them, tracking meanwhile, searching, and having but one.
+"""What several maps cost: merging two of them, tracking during the merge, searching, and a single
+map.
 
 Maps are made up (`benchmarks.loops.made_up_map`): a camera drives around a ring, once for each of
-two maps, each with a drift of its own.
+two maps, each with another drift.
 
     python -m benchmarks.several_maps.speed
     python -m benchmarks.several_maps.speed --parts merge search --repeat 20
@@ -37,8 +38,8 @@ from orbslam2py.slam.merging import MapMerging
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 
-#: Limits: seconds of joining two maps without the full adjustment after it, milliseconds that
-#: nobody reads the map meanwhile, p99 of tracking meanwhile by that without.
+#: Limits: seconds of joining two maps without the full adjustment after it, milliseconds for which
+#: readers are locked out, and p99 of tracking during the merge divided by that without a merge.
 MOST_SECONDS, MOST_LOCKED_MS, MOST_P99_RATIO = 0.5, 20.0, 2.0
 #: By how much times may differ that are to be equal: of whole runs, and of searches.
 NOISE, SEARCH_NOISE = 0.03, 0.1
@@ -141,7 +142,7 @@ def merge_table(rings: Rings, repeat: int) -> tuple[Table, bool]:
         f"Joining two maps of {n} keyframes and {slam_map.n_points // 2} points each",
         [""],
         ["median", "longest", "limit", "met"],
-        f"{len(totals)} times, and {len(locked)} times with somebody who reads the map meanwhile",
+        f"{len(totals)} times, and {len(locked)} times with a reader of the map",
     )
     for step, times in steps.items():
         table.add_row(f"{step}, ms", f"{statistics.median(times):.1f}", f"{max(times):.1f}", "", "")
@@ -246,7 +247,7 @@ def tracking_table(rings: Rings, images: list[Images], passes: int) -> tuple[Tab
         table.add_row(name, str(len(times)), *(f"{value:.1f}" for value in values), "", "")
     ratio = p99[1] / p99[0]
     table.add_row(
-        "p99 meanwhile / without", "", "", "", f"{ratio:.2f}", f"{MOST_P99_RATIO:g}",
+        "p99 during / without", "", "", "", f"{ratio:.2f}", f"{MOST_P99_RATIO:g}",
         verdict(ratio <= MOST_P99_RATIO),
     )  # fmt: skip
     return table, ratio <= MOST_P99_RATIO

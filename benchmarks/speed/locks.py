@@ -60,7 +60,7 @@ def lock_tables(build: Path) -> Iterator[object]:
             "max\nused",
             "max\nwait",
         ],
-        "Held is wall-clock time: a thread that loses the processor goes on holding the lock. "
+        "Held is wall-clock time: a thread that loses the processor still holds the lock. "
         "Used: processor time\nwhile the lock was held.",
     )
     for figure in reference.SEQUENCES:

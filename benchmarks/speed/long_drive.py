@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a frame costs, and how much memory a map takes, as a drive along a street gets longer.
+"""Time per frame and memory of the map, as a drive along a street gets longer.
 
 One run in the deterministic mode, where mapping and loop detection are part of a frame: what grows
 is seen in the processor time of each. Images are rendered on the way, outside of what is measured.

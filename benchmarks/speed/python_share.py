@@ -151,7 +151,7 @@ def measure(folder: Path, sensor: Sensor, *, tracking_only: bool) -> PythonShare
 
 # ---- table ---------------------------------------------------------------------------------------
 def python_tables() -> Iterator[object]:
-    """The share in every sequence, each measured in a process of its own."""
+    """The share in every sequence, each measured in a separate process."""
     if shared_folder() is None:
         yield f"[yellow]Python's share: left out, {MISSING}"
         return

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What it costs tracking to be watched: real time, with a page connected and without, in pairs.
+"""Cost of the viewer for tracking: real time, with a page connected and without, in pairs.
 
     python -m benchmarks.speed.viewer_cost [--pairs 5]
 
 Who looks is a program at this computer that takes all that a browser would take and draws nothing,
-since a browser is at another computer or draws with hardware of its own.
+since a browser runs on another computer or draws with its graphics hardware.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Watched:
 
 
 def run_once(folder: Path, sensor: str, *, watched: bool) -> Watched:
-    """Run a sequence in real time, with somebody who looks or without.
+    """Run a sequence in real time, with or without a client of the viewer.
 
     Raises
     ------

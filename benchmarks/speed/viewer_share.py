@@ -115,7 +115,7 @@ def _any_frame() -> core.Frame:
 
 
 def follow_large_map(seconds: float) -> Share:
-    """Map on for a while, with somebody who looks."""
+    """Continue mapping for a while, with a client of the viewer."""
     with orb.System("tum1", "rgbd") as system:
         large = StraightMap(system.pipeline.back_end.map, _any_frame())
         for _ in range(KEYFRAMES):
@@ -132,7 +132,7 @@ def follow_large_map(seconds: float) -> Share:
 
 # ---- images --------------------------------------------------------------------------------------
 def show_images(folder: Path, sensor: str, rate: float) -> Share:
-    """Track a sequence in real time, with somebody who looks."""
+    """Track a sequence in real time, with a client of the viewer."""
     sequence = orb.open_sequence(folder, sensor)
     frames = iter([(frame.images, frame.timestamp) for frame in sequence])
     with orb.System(sequence.settings, sensor) as system:
@@ -224,7 +224,7 @@ def _seconds_of(process: int) -> float:
 
 # ---- without a viewer ----------------------------------------------------------------------------
 def unwatched_share() -> tuple[float, float]:
-    """Seconds that an image costs more because somebody could watch, and of an image in all."""
+    """Additional seconds per image because a client may connect, and total seconds per image."""
     sequence = SyntheticSequence(SyntheticOptions(sensor="rgbd", frames=10))
     with orb.System(sequence.settings, "rgbd", deterministic=True) as system:
         begin = time.thread_time()

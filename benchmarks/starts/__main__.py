@@ -4,7 +4,7 @@
 Each recording is played from five first images with many seeds. A start is wrong if the path of a
 map's first 30 frames, aligned by Sim(3), is off by more than a tenth of its length; it is late if
 it comes more than 2 s after two views within a second show enough parallax. Both are those of
-`benchmarks.holding_on`. What has been played stands in the CSV file and is not played again.
+`benchmarks.holding_on`. Finished runs are in the CSV file and are not repeated.
 
     python -m benchmarks.starts --seeds 20
     python -m benchmarks.starts --seeds 12 --only desk

@@ -68,7 +68,7 @@ class StartCase:
 
     @property
     def key(self) -> str:
-        """All that tells it from other runs."""
+        """Key that identifies the run."""
         return f"{self.recording.name} | {self.first} | {self.seed}"
 
     def scene(self) -> RecordedScene:

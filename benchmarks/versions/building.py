@@ -25,7 +25,7 @@ GOAL, TIMES = 4.0, 1.5
 
 @dataclass(frozen=True)
 class Built:
-    """What one build took."""
+    """Resources of one build."""
 
     minutes: float
     slowest: list[tuple[float, str]]  #: seconds on the clock and file, longest first

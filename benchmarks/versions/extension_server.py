@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One version's extension, in a process of its own, doing what it is told line by line.
+"""One version's extension in a separate process, which carries out commands line by line.
 
     PYTHONPATH=PACKAGE python extension_server.py PACKAGE IMAGES.npz
 

@@ -156,6 +156,6 @@ def start(package: Path, images: Path, kind: str) -> subprocess.Popen[str]:
 
 
 def units_of(server: subprocess.Popen[str]) -> list[str]:
-    """What it says first."""
+    """Its first message."""
     assert server.stdout is not None
     return server.stdout.readline().split()

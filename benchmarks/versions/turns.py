@@ -3,9 +3,9 @@
 
 The other version is a checkout in which it is installed (``git worktree add ../before COMMIT``, and
 there ``make install``). Each turn plays every sequence with both, one after the other, so that both
-see the same machine. With threads a turn has a seed of its own; deterministic runs differ by
-nothing but their first image, so there each begins one image later. Speed wants a machine on which
-nothing else runs. Where a recording's own calibration is in question, both take another one with
+see the same machine. With threads each turn has another seed; deterministic runs differ by nothing
+but their first image, so there each begins one image later. Speed wants a machine on which nothing
+else runs. Where a recording's own calibration is in question, both take another one with
 ``--settings``, or right images moved by a part of a pixel with ``--right-moved``.
 
     python -m benchmarks.versions.turns ../before
@@ -67,7 +67,7 @@ _COLUMNS = (
 
 
 def options_of_turn(turn: int, *, deterministic: bool, settings: Path | None = None) -> list[str]:
-    """What both versions' runs have in common; what tells the turns apart comes first."""
+    """What both versions' runs have in common; the fields that identify a turn come first."""
     own = ["--deterministic", "--start", str(turn)] if deterministic else ["--seed", str(turn)]
     return own if settings is None else [*own, "--settings", str(settings.resolve())]
 

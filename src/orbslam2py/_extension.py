@@ -76,15 +76,15 @@ def load() -> ModuleType:
         # Loading it would end the program by an illegal instruction.
         raise ImportError(
             f"This processor lacks {', '.join(lacking)}, which orbslam2py uses (x86-64-v2).\n"
-            "Use a machine with a processor of 2009 or later, or tell the virtual machine to pass "
-            "its host's processor on.",
+            "Use a machine with a processor of 2009 or later, or configure the virtual machine "
+            "to use its host's processor.",
             name=NAME,
         )
     try:
         return importlib.import_module(NAME)
     except ImportError as error:
         if isinstance(error.__cause__, KeyboardInterrupt):
-            # Ctrl-C while it was loaded, which pybind11 tells as a failure to load.
+            # Ctrl-C during loading, which pybind11 reports as a failure to load.
             raise KeyboardInterrupt from error
         folder = Path(__file__).parent
         names = sorted(path.name for path in folder.glob("_core.*.so"))

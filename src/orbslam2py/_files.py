@@ -88,7 +88,7 @@ def utf8_path(
 
 
 def kind_of_special(path: Path) -> str | None:
-    """Return what a path is if it is no file or folder: a pipe would wait for a writer.
+    """Return the kind of a path that is neither file nor folder: a pipe would wait for a writer.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
             yield stream
         return
     temporary = temporary_beside(target)
-    try:  # a Ctrl-C may come as soon as it is there
+    try:  # a Ctrl-C may arrive once it exists
         stream = _open(path, temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, binary)
         try:
             take_mode(temporary, target)
@@ -229,7 +229,7 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path_of(path, "the folder to write")))
     temporary, old = temporary_beside(target), temporary_beside(target, ".old")
-    try:  # a Ctrl-C may come as soon as it is there
+    try:  # a Ctrl-C may arrive once it exists
         try:
             temporary.mkdir(parents=True)
         except OSError as error:

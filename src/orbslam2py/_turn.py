@@ -24,7 +24,7 @@ class Turn:
         self._condition = threading.Condition()
         self._waiting: deque[int] = deque()
         self._depth = 0
-        #: The thread whose turn it is, None if it is nobody's.
+        #: The thread whose turn it is; None without one.
         self.owner: int | None = None
 
     def __enter__(self) -> None:
@@ -41,7 +41,7 @@ class Turn:
 
     @contextlib.contextmanager
     def lent(self) -> Iterator[None]:
-        """A step enters it around callbacks of users, which may wait for other callers."""
+        """Leave the turn during a user's callback, which may wait for other callers."""
         me = threading.get_ident()
         with self._condition:
             depth = self._depth if self.owner == me else 0

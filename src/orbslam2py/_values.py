@@ -26,7 +26,7 @@ def replace(value: _Value, **changes: Any) -> _Value:
         raise TypeError(f"{kind.__name__} has no field {unknown}")
     old = value.__dict__
     copy = object.__new__(kind)
-    # What a cached property holds belongs to the old value alone.
+    # Values of cached properties belong to the old object and are not copied.
     copy.__dict__.update(old if len(old) == len(names) else {name: old[name] for name in names})
     copy.__dict__.update(changes)
     return copy

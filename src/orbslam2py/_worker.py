@@ -99,7 +99,7 @@ class Worker(Generic[Job]):
         self._turn = Turn()  # of inline steps
         #: Raised when the running step should end early; lowered when a step begins.
         self.interrupt_flag = core.StopFlag()
-        #: Raised when nobody wants the running step's result any more (reset, finish).
+        #: Raised when the result of the running step is no longer needed (reset, finish).
         self.cancel_flag = core.StopFlag()
         #: Raised while jobs wait behind the running one.
         self.waiting_flag = core.StopFlag()
@@ -215,7 +215,7 @@ class Worker(Generic[Job]):
                     self._queue.clear()
                     self.waiting_flag.clear()
                 if not isinstance(error, Exception):
-                    raise  # Ctrl-C: it goes on with the next job
+                    raise  # Ctrl-C: it continues with the next job
                 self._error = error
             finally:
                 with self._condition:
@@ -277,7 +277,7 @@ class Worker(Generic[Job]):
                 self._off_duty = False
 
     def lend_turn(self) -> contextlib.AbstractContextManager[None]:
-        """Let inline steps of other threads run meanwhile: used around callbacks of users."""
+        """Let inline steps of other threads run during a callback of the user."""
         return self._turn.lent()
 
     # ---- pauses ----------------------------------------------------------------------------------
@@ -354,7 +354,7 @@ class Worker(Generic[Job]):
     def wait_until_waiting(self, at_most: int) -> None:
         """Wait while more than `at_most` jobs wait, or a brief pause lasts.
 
-        Returns at once when a pause is in force that may last.
+        Returns at once during a pause that may last long.
         """
 
         def done() -> bool:

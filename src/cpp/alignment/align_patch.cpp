@@ -2,8 +2,8 @@
 // Written from S. Baker, I. Matthews, "Lucas-Kanade 20 years on", IJCV 2004 (inverse compositional)
 // and C. Forster et al., "SVO", T-RO 2017 (the warped patch moves over the image).
 //
-// Gain and offset are solved for exactly in every step: gradients and values of the patch are made
-// orthogonal to what gain and offset can explain, so that a step needs three sums of products.
+// Every step solves for gain and offset exactly. Gradients and values of the patch are made
+// orthogonal to a change of gain or offset, so a step needs three sums of products.
 #include "alignment/align_patch.hpp"
 
 #include <Eigen/LU>
@@ -30,11 +30,13 @@ constexpr int kStride = 28;  // of a row of the window: loads of padding stay in
 
 // Values have the unit 1/16 grey value (smooth.hpp).
 constexpr double kGrey = 16;
-/// Of white noise, smoothing and interpolation leave this share of the variance, in one direction.
+/// Share of the variance of white noise that remains after smoothing and interpolation, per
+/// direction.
 constexpr double kLeftOfNoise = 0.316;
 /// Correlation of that noise between a pixel and the two next to it, in one direction.
 constexpr float kNear = 0.74F, kFar = 0.29F;
-/// Pixels less what such noise hides in position, gain and offset.
+/// Degrees of freedom of the residuals: the pixels, minus the part of their noise that the fit of
+/// position, gain and offset absorbs.
 constexpr double kFreedom = kPixels - 16;
 /// Variance of rounding to whole grey values in both images, after smoothing.
 constexpr double kRounding = 2.0 / 12.0 * kLeftOfNoise * kLeftOfNoise;
@@ -89,7 +91,7 @@ double dot(const Plane& a, const Plane& b) {
 /// Ones where there are pixels, zeros in the padding.
 constexpr Four kInside[kVectors] = {{1, 1, 1, 1}, {1, 1, 1, 1}, {1, 0, 0, 0}};
 
-/// Makes the mean zero; the padding must be zero and stays it.
+/// Makes the mean zero. The padding must be zero and stays zero.
 void subtract_mean(Plane& plane) {
   Four sums[kVectors] = {};
   for (int y = 0; y < kSide; ++y) {
@@ -135,7 +137,7 @@ void correlate(const Plane& in, Plane& out) {
   }
 }
 
-/// The patch as the image should show it, with what the steps need.
+/// The warped patch, and the sums that every step needs.
 struct Template {
   Plane values;        // mean 0
   Plane gx, gy;        // gradients, orthogonal to constant and values
@@ -231,7 +233,7 @@ AlignmentFailure make_template(const ReferencePatch& reference, const Eigen::Mat
 /// The part of the image that the patch can reach.
 class Window {
  public:
-  /// Pixels beyond the border of the image repeat it; is_inside() tells what may be used.
+  /// Pixels beyond the border of the image repeat it; is_inside() says which positions are valid.
   Window(const cv::Mat& level, int x, int y)
       : x_(x - kReach), y_(y - kReach), columns_(level.cols), rows_(level.rows) {
     constexpr int kBytes = kWindow + 2;
@@ -256,8 +258,8 @@ class Window {
            position.y() < rows_ - 1 - kHalf;
   }
 
-  /// Calls visit(y, k, values) with the interpolated values of the patch, four at a time. What it
-  /// gives for the padding is of no meaning.
+  /// Calls visit(y, k, values) with the interpolated values of the patch, four at a time. The
+  /// values of the padding are meaningless.
   template <class Visit>
   void sample(const Eigen::Vector2d& position, const Visit& visit) const {
     const double left = position.x() - kHalf, top = position.y() - kHalf;
@@ -292,7 +294,7 @@ class Window {
 };
 static_assert(2 * kReach + 1 - kSide + kColumns + 1 <= kStride);
 
-/// Gain, correlation and information where the patch has come to rest.
+/// Gain, correlation and information at the final position.
 void judge(const Template& patch, const Window& window, PatchAlignment& result) {
   Plane seen{};
   window.sample(result.position,
@@ -314,7 +316,7 @@ void judge(const Template& patch, const Window& window, PatchAlignment& result) 
       (result.gain * result.gain / variance) * patch.H * scatter.inverse() * patch.H;
 }
 
-/// One step; false when there is none.
+/// One step; false when no step can be computed.
 bool step(const Template& patch, const Window& window, const Eigen::Vector2d& position,
           Eigen::Vector2d& move) {
   Four x[kVectors] = {}, y[kVectors] = {}, value[kVectors] = {};
@@ -360,7 +362,7 @@ PatchAlignment align_patch(const ReferencePatch& reference, const Eigen::Matrix2
     ++result.iterations;
     if (!step(patch, window, result.position, move)) return result;
     result.position += move;
-    // Negated, so that NaN ends it.
+    // The condition is negated, so that NaN ends the loop.
     if (!((result.position - start).norm() <= most)) return result;
     converged = move.norm() < options.converged;
   }

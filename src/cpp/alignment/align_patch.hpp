@@ -14,8 +14,8 @@ enum class AlignmentFailure : std::uint8_t {
   kNone,            ///< it was
   kOutside,         ///< patch or image do not reach that far, or a number is not finite
   kFlat,            ///< no texture, or texture in one direction only (an edge)
-  kNotConverged,    ///< it moved too far, or did not come to rest
-  kLowCorrelation,  ///< it came to rest where the image is another one
+  kNotConverged,    ///< it moved too far, or did not converge
+  kLowCorrelation,  ///< it converged where the grey values do not agree
 };
 constexpr int kAlignmentFailures = 5;  ///< values of the enum
 
@@ -28,8 +28,8 @@ struct AlignmentOptions {
   double converged = 0.01;       ///< a step shorter than that is the last one [pixels]
 };
 
-/// Least variance of an aligned position [pixels of the level, squared]: what interpolation and the
-/// assumed shape of the patch leave.
+/// Least variance of an aligned position [pixels of the level, squared]. Interpolation and the
+/// assumed shape of the patch cause errors of this size.
 inline constexpr double kLeastAlignedVariance = 0.05 * 0.05;
 
 struct PatchAlignment {

@@ -28,9 +28,9 @@ struct Id {
 using KeyFrameId = Id<struct KeyFrameTag>;
 using MapPointId = Id<struct MapPointTag>;
 
-/// Ids from here on belong to temporary points: made of the last frame's depths in localization
-/// mode, not part of the map (which never finds them), without observations. A keypoint that holds
-/// one can still be taken by another point.
+/// Ids from here on belong to temporary points. Localization mode makes them of the last frame's
+/// depths. They have no observations, and the map does not contain them. A keypoint with a
+/// temporary point can still be matched to a point of the map.
 inline constexpr MapPointId kFirstTemporaryPoint{std::int64_t{1} << 62};
 constexpr bool is_temporary(MapPointId id) { return id >= kFirstTemporaryPoint; }
 

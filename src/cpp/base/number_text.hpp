@@ -11,8 +11,8 @@
 
 namespace orbslam {
 
-/// Numbers in the text of files, whatever the locale: by the C locale of POSIX. For libraries whose
-/// <charconv> has no floating point yet (GCC 10).
+/// Numbers in text files, read and written in the C locale of POSIX and not in the user's locale.
+/// For libraries whose <charconv> has no floating point yet (GCC 10).
 namespace c_locale {
 
 inline locale_t get() {
@@ -49,7 +49,7 @@ inline char* write_number(char* first, char* last, double value) {
 }  // namespace c_locale
 
 /// Reads a number; returns where it ends, `first` where there is none. A number that is out of
-/// range leaves `value` as it is.
+/// range does not change `value`.
 inline const char* read_number(const char* first, const char* last, double& value) {
 #ifdef __cpp_lib_to_chars
   return std::from_chars(first, last, value).ptr;
@@ -58,7 +58,8 @@ inline const char* read_number(const char* first, const char* last, double& valu
 #endif
 }
 
-/// Writes a number with 17 significant digits, which tell it exactly; returns where it ends.
+/// Writes a number with 17 significant digits, from which it can be read back exactly; returns
+/// where it ends.
 inline char* write_number(char* first, char* last, double value) {
 #ifdef __cpp_lib_to_chars
   return std::to_chars(first, last, value, std::chars_format::general, 17).ptr;

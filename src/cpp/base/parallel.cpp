@@ -13,19 +13,18 @@ namespace {
 
 constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
 
-/// Those that this process may use, which a container or a scheduler of jobs may limit.
+/// Cores that this process may use; a container or a job scheduler may limit them.
 std::size_t n_cores() {
   cpu_set_t usable;
   if (sched_getaffinity(0, sizeof usable, &usable) == 0) {
     return static_cast<std::size_t>(CPU_COUNT(&usable));
   }
-  return std::max(1U, std::thread::hardware_concurrency());  // more than such a set can tell of
+  return std::max(1U, std::thread::hardware_concurrency());  // more than such a set can hold
 }
 
 bool is_space(char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; }
 
-/// What OMP_NUM_THREADS says of the outermost level; kNoLimit where it says nothing that makes
-/// sense.
+/// The number in OMP_NUM_THREADS for the outermost level; kNoLimit if it is unset or invalid.
 std::size_t wanted_threads() {
   const char* const variable = std::getenv("OMP_NUM_THREADS");
   if (variable == nullptr) return kNoLimit;

@@ -17,7 +17,7 @@ namespace orbslam {
 /// core; the Python side reads it in the same way (_cores.py).
 std::size_t threads_for(std::size_t most);
 
-/// Threads beside the caller's, which are waited for when it goes.
+/// Threads beside the caller's; the destructor waits for them.
 class HelperThreads {
  public:
   HelperThreads() = default;
@@ -41,9 +41,9 @@ class HelperThreads {
   std::vector<std::thread> threads_;
 };
 
-/// Calls work(i) for i = 0 .. n - 1, each once, in no particular order, in `n_threads` threads of
-/// which the caller's is one; fewer do the same where the system gives no more. An exception ends
-/// the rest. Of several that of the lowest i is thrown, whatever the number of threads.
+/// Calls work(i) once for each i = 0 .. n - 1, in no particular order. It uses `n_threads` threads,
+/// the caller's included, or fewer if the system gives no more. After an exception no further call
+/// is begun. Of several exceptions that of the lowest i is thrown, for any number of threads.
 template <class Work>
 void for_each_in_parallel(std::size_t n, std::size_t n_threads, const Work& work) {
   std::atomic<std::size_t> next{0};
@@ -55,7 +55,7 @@ void for_each_in_parallel(std::size_t n, std::size_t n_threads, const Work& work
       try {
         work(i);
       } catch (...) {
-        // All that are lower have begun before this one, so the lowest that fails is found.
+        // All lower calls have begun before this one, so the lowest one that fails is found.
         const std::lock_guard lock(mutex);
         if (i < failed) {
           failed = i;

@@ -26,7 +26,7 @@ class Pose {
 
   /// From a 4x4 homogeneous matrix; the rotation is projected onto SO(3).
   static Pose from_matrix(const Eigen::Matrix4d& matrix);
-  /// Takes a quaternion of unit length as it is, so that a pose that was written down comes back
+  /// Takes a quaternion of unit length without normalising it, so that a stored pose is restored
   /// bit by bit. The caller has checked its length.
   static Pose from_unit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
     Pose pose;

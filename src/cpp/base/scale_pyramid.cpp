@@ -57,7 +57,7 @@ std::vector<int> ScalePyramid::features_per_level(int n_features) const {
 int ScalePyramid::predict_level(double max_distance, double distance) const {
   const float ratio = static_cast<float>(max_distance / distance);
   const float level = std::ceil(std::log(ratio) / log_factor_);
-  // What is no number, or too large for an int, must not be converted to one.
+  // NaN and numbers too large for an int must not be converted to int.
   if (!(level > 0.0F)) return 0;
   const int coarsest = levels() - 1;
   return level < static_cast<float>(coarsest) ? static_cast<int>(level) : coarsest;

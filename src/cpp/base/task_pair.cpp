@@ -27,7 +27,7 @@ void TaskPair::offer(Call call, const void* work) {
   work_ = work;
   state_ = State::kOffered;  // all in one order with asleep_: one of the two sees the other
   if (!asleep_) return;
-  { const std::lock_guard lock(mutex_); }  // it waits by now
+  { const std::lock_guard lock(mutex_); }  // the helper waits
   changed_.notify_one();
 }
 
@@ -41,7 +41,7 @@ void TaskPair::wait_until_done() {
   state_ = State::kNothing;
 }
 
-/// Whether work was taken; false: the pair ends.
+/// True when the helper has taken work, false when the pair ends.
 bool TaskPair::look_for_work() {
   const auto take = [this] {
     State offered = State::kOffered;

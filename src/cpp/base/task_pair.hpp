@@ -9,10 +9,11 @@
 
 namespace orbslam {
 
-/// Two tasks at a time for two threads: the caller's and a helper. For many short pairs one right
-/// after the other: between them the helper looks for the next one before it sleeps, since waking
-/// it for each would take away what it brings. On a busy computer, where the helper does not come,
-/// the caller does both; nothing is waited for that has not begun.
+/// Runs two tasks at the same time in two threads: the caller's and a helper. It is made for many
+/// short pairs in quick succession. After a pair the helper polls for the next one for a short time
+/// before it sleeps, because waking it for each pair would cost more than it saves. If a busy
+/// computer does not run the helper, the caller does both tasks. The caller never waits for a task
+/// that has not begun.
 class TaskPair {
  public:
   TaskPair();
@@ -21,7 +22,7 @@ class TaskPair {
   TaskPair(const TaskPair&) = delete;
   TaskPair& operator=(const TaskPair&) = delete;
 
-  /// Calls work(0) and work(1), at the same time if the helper comes; both are done on return. One
+  /// Calls work(0) and work(1), at the same time if the helper runs; both are done on return. One
   /// caller at a time; `work` must not throw.
   template <class Work>
   void run(const Work& work) {

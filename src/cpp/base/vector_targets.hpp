@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// Which vector units Highway compiles kernels for; included before any of its headers. Beside SSE4
-// (x86-64-v2), AVX2 (v3) and AVX-512 (v4), or NEON, or plain C++ on other processors, nothing.
-// (Macros are how Highway is configured.)
+// Which vector units Highway compiles kernels for; included before any of its headers. They are
+// SSE4 (x86-64-v2), AVX2 (v3) and AVX-512 (v4), or NEON, or plain C++ on other processors. (Macros
+// are how Highway is configured.)
 
 // The kernels need none of these, so a processor does not need them either.
 #define HWY_DISABLE_PCLMUL_AES

@@ -22,7 +22,7 @@ const char* name_of(VectorUnit unit);
 const std::vector<VectorUnit>& vector_units();
 
 /// True if the environment variable ORBSLAM2PY_PORTABLE_KERNELS is set to anything but 0. Read
-/// once, so that nothing in a process differs from the rest.
+/// once, so that the whole process uses one set of kernels.
 bool portable_by_environment();
 
 /// The last of `vector_units`, or the first if the environment asks for portable kernels.

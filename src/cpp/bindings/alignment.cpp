@@ -26,9 +26,9 @@ void bind_failures(py::module_& module) {
              "Patch or image do not reach that far, or a number is not finite.")
       .value("FLAT", AlignmentFailure::kFlat, "No texture, or texture in one direction only.")
       .value("NOT_CONVERGED", AlignmentFailure::kNotConverged,
-             "It moved too far, or did not come to rest.")
+             "It moved too far, or did not converge.")
       .value("LOW_CORRELATION", AlignmentFailure::kLowCorrelation,
-             "It came to rest where the image is another one.");
+             "It converged where the grey values do not agree.");
   py::class_<AlignmentOptions>(module, "AlignmentOptions", "How align_patch works.")
       .def(py::init([](int iterations, double max_shift, double min_correlation, double converged) {
              return AlignmentOptions{iterations, max_shift, min_correlation, converged};

@@ -166,7 +166,7 @@ void check_level(const ScalePyramid& scales, int level) {
 }
 
 void bind_scale_pyramid(py::module_& module) {
-  py::class_<ScalePyramid>(module, "ScalePyramid", "The scale tables of an image pyramid.")
+  py::class_<ScalePyramid>(module, "ScalePyramid", "Scale tables of an image pyramid.")
       .def(py::init<float, int, bool>(), py::arg("factor"), py::arg("levels"),
            py::arg("original_coordinates") = false,
            "`factor`: ratio between levels, above 1 and at most 2. `levels`: 1 to 16. Raises "

@@ -227,7 +227,7 @@ void bind_camera(py::module_& module) {
       .def(
           "project", &project, py::arg("points"),
           "Pixels (n, 2) float64 of the plane of points (n, 3) in the camera frame; NaN for those\n"
-          "that are not visible. Bounds are not asked.")
+          "that are not visible. Bounds are not checked.")
       .def(
           "errors", &errors, py::arg("points"), py::arg("pixels"),
           "Errors (n, 2) float64 [raw px] of the projections of points (n, 3) in the camera frame\n"

@@ -207,8 +207,7 @@ void bind_features(py::module_& module) {
         for (const VectorUnit unit : vector_units()) names.emplace_back(name_of(unit));
         return names;
       },
-      "Names of the vector units that there are kernels for and this processor has, slowest "
-      "first.");
+      "Names of the vector units of this processor that have kernels, slowest first.");
   module.def("hamming_distances", &hamming_distances, py::arg("a"), py::arg("b"),
              "Number of differing bits row by row: (n, 32) and (n, 32) uint8 to (n,) int32.");
   module.def("hamming_matrix", &hamming_matrix, py::arg("a"), py::arg("b"),

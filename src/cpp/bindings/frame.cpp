@@ -146,9 +146,9 @@ std::size_t checked(const TrackedFrame& tracked, py::ssize_t i) {
 }
 
 void bind_frame_class(py::module_& module) {
-  py::class_<Frame, std::shared_ptr<Frame>>(
-      module, "Frame",
-      "What one image (pair) says: features, depths, words. Arrays are copies; n keypoints.")
+  py::class_<Frame, std::shared_ptr<Frame>>(module, "Frame",
+                                            "Measurements of one image (or pair): features, "
+                                            "depths, words. Arrays are copies; n keypoints.")
       .def("__len__", &Frame::size)
       .def_property_readonly("size", &Frame::size, "Number n of keypoints.")
       .def_readonly("id", &Frame::id)
@@ -225,12 +225,13 @@ void bind_frame_class(py::module_& module) {
 void bind_tracked_frame(py::module_& module) {
   py::class_<TrackedFrame, std::shared_ptr<TrackedFrame>>(
       module, "TrackedFrame",
-      "A frame with the pose and the associations the tracker gives it. Arrays are copies.")
+      "A frame with its pose and the map point of each keypoint, set by tracking. Arrays are "
+      "copies.")
       .def(py::init([](const std::shared_ptr<Frame>& frame) { return TrackedFrame(frame); }),
            py::arg("features").none(false))
       .def_property_readonly(
           "features", [](const TrackedFrame& t) { return std::const_pointer_cast<Frame>(t.frame); },
-          "What was seen: keypoints, descriptors and depths.")
+          "Measurements: keypoints, descriptors and depths.")
       .def_property_readonly(
           "id", [](const TrackedFrame& t) { return t.frame->id; }, "Id of the frame.")
       .def_property_readonly(
@@ -343,7 +344,8 @@ void bind_tracked_frame(py::module_& module) {
 
 void bind_builders(py::module_& module) {
   // ScalePyramid is copied: a small table, and Python's object need not be a shared one.
-  py::class_<FrameContext>(module, "FrameContext", "What all frames of one system share.")
+  py::class_<FrameContext>(module, "FrameContext",
+                           "Camera and parameters that all frames of one system share.")
       .def(py::init([](const std::shared_ptr<Camera>& camera, const ScalePyramid& scales) {
              return FrameContext{camera, std::make_shared<ScalePyramid>(scales)};
            }),
@@ -453,7 +455,7 @@ void bind_frame(py::module_& module) {
       py::arg("frame"), py::arg("image"), py::arg("is_rgb"),
       py::arg("grey").none(true) = py::none(), py::arg("left").none(true) = py::none(),
       py::arg("right").none(true) = py::none(), py::arg("rectifier").none(true) = py::none(),
-      "Keep of the image of a new frame what later steps need.\n\n"
+      "Keep the data of a new frame's image that later steps need.\n\n"
       "Its colours at the keypoints, of an image (h, w, 3) or (h, w, 4) uint8; with the rectifier\n"
       "of a raw pair it is the raw left one. Where given, the grey image (h, w) uint8, shrunk to\n"
       "some 1500 pixels, for align_rotation(), and the image pyramids of `left` and `right`, in\n"

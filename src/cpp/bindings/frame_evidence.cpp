@@ -30,8 +30,8 @@ void bind_rotation(py::module_& module) {
         return align_rotation(first.small_image, second.small_image, *second.camera);
       },
       py::arg("first"), py::arg("second"),
-      "How the camera turned between two frames, by their small images alone: ImageRotation, or\n"
-      "None where the images are missing or say nothing.");
+      "Rotation of the camera between two frames, from their small images alone: ImageRotation, or "
+      "None if the images are missing or have no contrast.");
 }
 
 void bind_inliers(py::module_& module) {
@@ -49,7 +49,7 @@ void bind_inliers(py::module_& module) {
         return std::make_tuple(spread.cells, spread.octaves, match_error, spread.covariance);
       },
       py::arg("frame"),
-      "What a frame's matches say of its pose: (cells, octaves, match error, covariance).\n\n"
+      "Evidence of a frame's matches for its pose: (cells, octaves, match error, covariance).\n\n"
       "How many of 48 cells of the image hold an inlier, and how many octaves of depth. The\n"
       "median distance between matched keypoints, outliers too, and the projections of their\n"
       "points, in standard deviations of the keypoints' levels; 0 without any. The (6, 6)\n"
@@ -57,7 +57,7 @@ void bind_inliers(py::module_& module) {
       "not determined. Raises StateError without a pose.");
   module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
              py::call_guard<py::gil_scoped_release>(),
-             "How many inliers of a frame a camera at `T_nw` would still have in its image.");
+             "Number of inliers of a frame that are in the image of a camera at `T_nw`.");
   module.def("median_displacement", &median_displacement, py::arg("frame"), py::arg("T_nw"),
              py::call_guard<py::gil_scoped_release>(),
              "Median distance [px] between the projections of a frame's inliers and those into a\n"
@@ -114,10 +114,11 @@ void bind_innovation(py::module_& module) {
       "`factor` times a covariance (6, 6), plus that of the motion of the map under the last "
       "frame\n"
       "since it was tracked, and `wrong_share` times that of the innovation.");
-  module.def("count_staying_after", &count_staying_after, py::arg("frame"), py::arg("velocity"),
-             py::arg("n_intervals"), py::call_guard<py::gil_scoped_release>(),
-             "How many inliers of a frame are still in its image after so many intervals of a\n"
-             "velocity. Raises StateError without a pose.");
+  module.def(
+      "count_staying_after", &count_staying_after, py::arg("frame"), py::arg("velocity"),
+      py::arg("n_intervals"), py::call_guard<py::gil_scoped_release>(),
+      "Number of inliers of a frame that are still in its image after a number of intervals of a\n"
+      "velocity. Raises StateError without a pose.");
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ void bind_two_view_types(py::module_& module) {
       .value("none", TwoViewModel::none)
       .value("homography", TwoViewModel::homography)
       .value("fundamental", TwoViewModel::fundamental);
-  py::class_<MotionScore>(module, "MotionScore", "What one motion hypothesis achieved.")
+  py::class_<MotionScore>(module, "MotionScore", "Support of one motion hypothesis.")
       .def_readonly("n_good", &MotionScore::n_good, "Pairs in front of both cameras that fit.")
       .def_readonly("parallax", &MotionScore::parallax, "Degrees; of the 51st best pair.");
   py::class_<TwoViewOptions>(module, "TwoViewOptions", "Limits of reconstruct_two_views.")
@@ -65,7 +65,7 @@ void bind_two_view_types(py::module_& module) {
       .def_property(
           "min_points", [](const TwoViewOptions& o) { return o.limits.min_points; },
           [](TwoViewOptions& o, std::size_t value) { o.limits.min_points = value; },
-          "Points a motion must place.")
+          "Least number of points that a motion must triangulate.")
       .def_property(
           "min_parallax", [](const TwoViewOptions& o) { return o.limits.min_parallax; },
           [](TwoViewOptions& o, double value) { o.limits.min_parallax = value; }, "Degrees.");
@@ -73,7 +73,8 @@ void bind_two_view_types(py::module_& module) {
 
 void bind_two_view_motion(py::module_& module) {
   using Motion = TwoViewMotion;
-  py::class_<Motion>(module, "TwoViewMotion", "A motion between two views, and what it places.")
+  py::class_<Motion>(module, "TwoViewMotion",
+                     "A motion between two views, and the points that it triangulates.")
       .def_readonly("T_21", &Motion::T_21,
                     "Pose from camera 1 to camera 2, translation of length 1.")
       .def_readonly("parallax", &Motion::parallax, "Degrees.")
@@ -106,8 +107,8 @@ void bind_two_view_result(py::module_& module) {
       .def_readonly("n_fundamental_inliers", &Result::n_fundamental_inliers, "Matches that fit F.")
       .def_readonly("hypotheses", &Result::hypotheses, "MotionScore of each motion tried.")
       .def_readonly("alternatives", &Result::alternatives,
-                    "Where the motion is ambiguous: TwoViewMotion of each that further views "
-                    "may choose.")
+                    "If the motion is ambiguous: a TwoViewMotion for each possible motion. Further "
+                    "views decide.")
       .def_readonly("best_hypothesis", &Result::best_hypothesis, "Index of the best one.")
       .def_readonly("T_21", &Result::T_21,
                     "Pose from camera 1 to camera 2, translation of length 1.")
@@ -177,8 +178,9 @@ void bind_place_points(py::module_& module) {
         return place_points(input, T_21, sigma);
       },
       "initial"_a, "current"_a, "matches"_a, "camera"_a, "T_21"_a, "sigma"_a = 1.0,
-      "What a motion that is known already places: a TwoViewMotion with all matches that fit it,\n"
-      "by the rules of reconstruct_two_views. `T_21`: Pose, camera 1 to camera 2; the length of\n"
+      "Triangulate all matches that agree with a known motion, by the rules of\n"
+      "reconstruct_two_views. Returns a TwoViewMotion. `T_21`: Pose, camera 1 to camera 2; the "
+      "length of\n"
       "its translation becomes 1. The others as there. Raises ValueError for bad shapes or\n"
       "indices, and for a translation of 0.");
 }

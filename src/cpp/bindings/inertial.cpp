@@ -199,7 +199,7 @@ void bind_filter(py::module_& module) {
           "perturbation.")
       .def("fuse", &F::fuse, "T_cw"_a, "covariance"_a, "inflation"_a = 1.0,
            "Take the pose of an image that was estimated with `pose` as prior, and its covariance. "
-           "What the image tells counts 1 / inflation times.")
+           "The information of the image is divided by inflation.")
       .def("update", &F::update, "T_cw"_a, "covariance"_a,
            "Take the pose of an image that was estimated without a prior.")
       .def("distance", &F::distance, "T_cw"_a, "covariance"_a,
@@ -257,7 +257,7 @@ InertialStart start_of(const std::vector<double>& times, const std::vector<Pose>
 void bind_start(py::module_& module) {
   using S = InertialStart;
   py::class_<S>(module, "InertialStart", "What estimate_inertial_start found.")
-      .def_readonly("solved", &S::solved, "False: the rest means nothing.")
+      .def_readonly("solved", &S::solved, "False: the other fields are meaningless.")
       .def_readonly("gravity", &S::gravity, "Free fall in the map (3,) [m/s^2].")
       .def_readonly("gravity_length", &S::gravity_length,
                     "Its length if it is not known to be 9.81: a check.")

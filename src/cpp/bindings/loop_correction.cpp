@@ -29,15 +29,15 @@ void bind_results(py::module_& module) {
       .def_readonly("n_fused", &LoopCorrectionResult::n_fused,
                     "Points replaced by points of the far side, or observations added to these.")
       .def_readonly("translation", &LoopCorrectionResult::translation,
-                    "How far `current` moved [m].")
-      .def_readonly("rotation", &LoopCorrectionResult::rotation, "By what angle it turned [rad].")
-      .def_readonly("scale", &LoopCorrectionResult::scale,
-                    "By what lengths around it were multiplied.");
+                    "Distance that `current` moved [m].")
+      .def_readonly("rotation", &LoopCorrectionResult::rotation, "Angle by which it turned [rad].")
+      .def_readonly("scale", &LoopCorrectionResult::scale, "Factor of lengths around it.");
 }
 
 void bind_correction(py::module_& module) {
-  py::class_<LoopCorrection>(module, "LoopCorrection",
-                             "What closing a loop does to the map, worked out on copies.")
+  py::class_<LoopCorrection>(
+      module, "LoopCorrection",
+      "The changes that closing a loop makes to the map, computed on copies.")
       .def_property_readonly(
           "n_keyframes", [](const LoopCorrection& c) { return c.keyframes.size(); },
           "Keyframes in the essential graph. 0: an end of the loop was dead.")
@@ -52,13 +52,14 @@ void bind_correction(py::module_& module) {
           "Points that move along.");
   module.def(
       "plan_loop_correction", &plan_loop_correction, "map"_a, "loop"_a, "fix_scale"_a, Release(),
-      "Work out how a loop corrects the map.\n\n"
-      "Carries the loop's similarity to the neighbours of its current keyframe, finds which "
+      "Plan how a loop corrects the map.\n\n"
+      "Propagates the loop's similarity to the neighbours of its current keyframe, finds which "
       "points\n"
       "are in the map twice, and builds the essential graph. `fix_scale`: where depth is "
       "measured.\n"
-      "Takes the map's read lock in short sections; the map is not changed. Local mapping must\n"
-      "rest until apply_loop_correction() is through. Raises ValueError when the loop's matches\n"
+      "Takes the map's read lock in short sections; the map is not changed. Local mapping "
+      "must be paused until apply_loop_correction() has returned. Raises ValueError when "
+      "the loop's matches\n"
       "are not one per keypoint. Returns a LoopCorrection.");
   module.def(
       "optimize_essential_graph",
@@ -71,13 +72,14 @@ void bind_correction(py::module_& module) {
       "every run. Returns a PoseGraphSummary.");
   module.def(
       "apply_loop_correction", &apply_loop_correction, "map"_a, "correction"_a, Release(),
-      "Carry out a correction in one write section, so that everybody else sees the map before it\n"
-      "or after it. Counts as a big change. Keyframes that are not in the graph (the tracker may\n"
+      "Carry out a correction in one write section, so that other threads see the map before or "
+      "after it. Counts as a big change. Keyframes that are not in the graph (the tracker may\n"
       "just have inserted one) follow the keyframe before them. Returns a LoopCorrectionResult.");
 }
 
 void bind_merge(py::module_& module) {
-  py::class_<MapMerge>(module, "MapMerge", "What joining two maps does, worked out on copies.")
+  py::class_<MapMerge>(module, "MapMerge",
+                       "The changes that merging makes to two maps, computed on copies.")
       .def_readonly("kept", &MapMerge::kept, "The older map; -1: they cannot be joined.")
       .def_readonly("moved", &MapMerge::moved, "The younger one, which moves into its world.")
       .def_property_readonly(
@@ -94,17 +96,15 @@ void bind_merge(py::module_& module) {
       .def_readonly("n_moved_keyframes", &MapMergeResult::n_moved_keyframes)
       .def_readonly("n_moved_points", &MapMergeResult::n_moved_points)
       .def_readonly("n_fused", &MapMergeResult::n_fused, "Points replaced or seen by more.")
-      .def_readonly("scale", &MapMergeResult::scale,
-                    "By which lengths of the moved map were multiplied.");
-  py::class_<KeyFramePoses>(module, "KeyFramePoses", "Where every keyframe of a map is.")
+      .def_readonly("scale", &MapMergeResult::scale, "Factor of lengths in the moved map.");
+  py::class_<KeyFramePoses>(module, "KeyFramePoses", "The poses of all keyframes of a map.")
       .def("__len__", [](const KeyFramePoses& self) { return self.ids.size(); })
       .def_property_readonly(
           "ids", [](const KeyFramePoses& self) { return to_array(self.ids); }, "(n,) int64.");
-  module.def(
-      "plan_map_merge", &plan_map_merge, "map"_a, "loop"_a, "fix_scale"_a, Release(),
-      "Work out how two maps become one: the younger one moves into the older one's world.\n\n"
-      "`loop`: of keyframes of both. The map is not changed. Local mapping must rest until\n"
-      "apply_map_merge() is through. Returns a MapMerge.");
+  module.def("plan_map_merge", &plan_map_merge, "map"_a, "loop"_a, "fix_scale"_a, Release(),
+             "Plan how two maps become one: the younger one moves into the older one's world.\n\n"
+             "`loop`: of keyframes of both. The map is not changed. Local mapping must be paused "
+             "until apply_map_merge() has returned. Returns a MapMerge.");
   module.def("apply_map_merge", &apply_map_merge, "map"_a, "merge"_a, Release(),
              "Carry it out in one write section, which counts as a big change. Returns a\n"
              "MapMergeResult.");
@@ -130,7 +130,7 @@ void bind_merge(py::module_& module) {
         return spread_from_seam(map, before, members, fix_scale, flag_of(abort));
       },
       "map"_a, "before"_a, "seam"_a, "fix_scale"_a, "abort"_a = py::none(), Release(),
-      "Spread what an adjustment of the seam has moved over the rest of the map, by a pose graph\n"
+      "Spread the motion of an adjusted seam over the rest of the map, by a pose graph\n"
       "with the relative poses of `before`. Returns whether anything was moved.");
 }
 

@@ -16,8 +16,8 @@ using namespace py::literals;
 void bind_detection(py::module_& module) {
   py::class_<LoopConsistency>(
       module, "LoopConsistency",
-      "Believes a loop only when consecutive keyframes propose the same part of the map.\n\n"
-      "Remembers what the keyframe before proposed (Mur-Artal et al. 2015, section VII-A). For\n"
+      "Accepts a loop only if consecutive keyframes propose the same part of the map.\n\n"
+      "Remembers the proposals of the keyframe before (Mur-Artal et al. 2015, section VII-A). For\n"
       "one thread.")
       .def(py::init<>())
       .def_property_readonly_static(
@@ -88,8 +88,8 @@ void bind_verification(py::module_& module) {
 
 void bind_choice(py::module_& module) {
   py::class_<LoopDrift>(module, "LoopDrift",
-                        "How far drift may have carried the map between the keyframes of a loop,\n"
-                        "and how far the loop says that it has. Lengths in units of the map.")
+                        "Largest possible drift between the keyframes of a loop,\n"
+                        "and the drift that the loop measures. Lengths in units of the map.")
       .def_readonly("path", &LoopDrift::path,
                     "Metres of the shortest way along the keyframe graph; inf without a way.")
       .def_readonly("turned", &LoopDrift::turned, "Radians turned along it.")

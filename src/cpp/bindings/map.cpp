@@ -123,7 +123,7 @@ void bind_queries(MapClass& map) {
             return std::const_pointer_cast<Frame>(living(self, id).frame);
           },
           "id"_a, Release(),
-          "What a living keyframe saw: keypoints, descriptors, depths, colours, words.")
+          "Measurements of a living keyframe: keypoints, descriptors, depths, colours, words.")
       .def(
           "frame_of",
           [](const Map& self, KeyFrameId id) {
@@ -236,7 +236,8 @@ void bind_parts(MapClass& map) {
       .def("is_upright", reader(&Map::is_upright), "map"_a, Release(),
            "Whether the third axis of the map's world is up, by an IMU, and its unit is the metre. "
            "Trajectories of other maps are relative to their first keyframe.")
-      .def("set_upright", writer(&Map::set_upright), "map"_a, Release(), "Note that it is so.")
+      .def("set_upright", writer(&Map::set_upright), "map"_a, Release(),
+           "Record that the map is upright.")
       .def("begin_map", writer(&Map::begin_map), Release(),
            "The next keyframe begins a map, which becomes the active one; its number. Nothing\n"
            "changes while the active one has no keyframe.")
@@ -264,7 +265,7 @@ void bind_parts(MapClass& map) {
           },
           "map"_a, "Drop a map with all that belongs to it; its keyframes: (n,) int64.")
       .def("join_maps", writer(&Map::join_maps), "child"_a, "parent"_a, Release(),
-           "All of the map of one keyframe belongs to that of the other one from now on.");
+           "Move all objects of the map of one keyframe to the map of the other one.");
 }
 
 void bind_changes(MapClass& map) {
@@ -306,7 +307,7 @@ void bind_changes(MapClass& map) {
            "Recompute descriptor, viewing direction and scale range of a point.")
       .def("update_connections", writer(&Map::update_connections), "id"_a, Release(),
            "Recount the points a keyframe shares with others.")
-      .def("count_big_change", &Map::count_big_change, "Tell that the map moved as a whole.")
+      .def("count_big_change", &Map::count_big_change, "Record that the whole map moved.")
       .def("clear", writer(&Map::clear), Release(), "Drop everything and start a new epoch.");
 }
 
@@ -393,7 +394,7 @@ void bind_local_map(py::module_& module) {
       "map"_a, "which"_a, "scale"_a, "pose"_a, Release(),
       "Move all keyframes and points of a map: `x' = scale R x + t` with R, t of the pose. Counts "
       "as "
-      "a big change; nobody may work on the map meanwhile.");
+      "a big change; no other thread may work on the map.");
   module.def("select_local_map", &select_local_map, "map"_a, "frame"_a, Release(),
              "Keyframes voted for by the frame's points, extended, and all their points.");
   module.def(

@@ -541,7 +541,7 @@ void bind_map_contents(py::module_& module) {
   module.def("map_contents", &map_contents, "map"_a,
              "known"_a = py::array_t<std::int64_t>(py::ssize_t{0}), "keyframe_stamp"_a = 0,
              "point_stamp"_a = 0, "incomplete_pages"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
-             "Everything that a map is at one moment, as arrays by name: see\n"
+             "The complete contents of a map at one moment, as arrays by name: see\n"
              "orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64\n"
              "ascending), which never change, are left out. With the stamps and incomplete pages\n"
              "of an earlier call, points come only of pages that may have changed since.");
@@ -558,7 +558,8 @@ void bind_map_contents(py::module_& module) {
                                                   words_fit);
            }),
            "contents"_a, "n_keypoints"_a, "vocabulary"_a = nullptr, "words_fit"_a = false,
-           "Contents without the keypoints, which are so many. With a vocabulary keyframes are\n"
+           "Contents without the keypoints, which need most of the memory. With a vocabulary "
+           "keyframes are\n"
            "described by words: by those given with the keypoints if they are of this one.")
       .def("add", &MapRestorer::add, "keypoints"_a, "n_keyframes"_a,
            "The arrays of the keypoints of so many more keyframes; they are copied.")

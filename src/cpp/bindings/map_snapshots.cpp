@@ -99,9 +99,9 @@ void bind_snapshots(py::module_& module) {
       "min_weight"_a = static_cast<int>(Map::kCovisibilityThreshold), "which"_a = kNoMap, Release(),
       "Copy the covisibility edges with at least `min_weight` shared points, of a map (-1: the\n"
       "active one).");
-  module.def("snapshot_observations", &snapshot_observations, "map"_a, "which"_a = kNoMap,
-             Release(),
-             "Copy who observes what, as compressed rows, of a map (-1: the active one).");
+  module.def(
+      "snapshot_observations", &snapshot_observations, "map"_a, "which"_a = kNoMap, Release(),
+      "Copy the observations of the points, as compressed rows, of a map (-1: the active one).");
 }
 
 void bind_trajectory(py::module_& module) {

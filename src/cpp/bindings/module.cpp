@@ -3,7 +3,8 @@
 
 PYBIND11_MODULE(_core, module) {
   using namespace orbslam::bindings;
-  module.doc() = "C++ core of orbslam2py: nouns (Frame, Map, Vocabulary, ...) and verbs over them.";
+  module.doc() =
+      "C++ core of orbslam2py: types (Frame, Map, Vocabulary, ...) and functions on them.";
   // Bottom to top, so that every signature finds its types registered.
   bind_base(module);
   bind_stop_flag(module);

@@ -55,14 +55,15 @@ std::vector<PoseObservation> pose_observations(const Input<double>& points,
 
 void bind_frame_sightings(py::module_& module) {
   using Release = py::call_guard<py::gil_scoped_release>;
-  py::class_<FrameSightings>(module, "FrameSightings",
-                             "What frames saw of the map, so that their poses can follow its "
-                             "points.")
+  py::class_<FrameSightings>(
+      module, "FrameSightings",
+      "Observations of past frames, with which their poses are estimated again.")
       .def(py::init<>(), "Nothing kept.")
       .def("__len__", &FrameSightings::size)
       .def("keep", &FrameSightings::keep, "frame"_a, Release(),
-           "Keep the inliers of a frame, in place of what was kept of it before.")
-      .def("forget", &FrameSightings::forget, "frame"_a, "Drop what a frame (its id) saw.")
+           "Store the inliers of a frame, and replace those stored before.")
+      .def("forget", &FrameSightings::forget, "frame"_a,
+           "Drop the observations of a frame (its id).")
       .def(
           "record",
           [](FrameSightings& sightings, const Map& map, TrajectoryRecorder& recorder,
@@ -77,14 +78,15 @@ void bind_frame_sightings(py::module_& module) {
             return frame.anchor.map;
           },
           "map"_a, "recorder"_a, "frame"_a, "lost"_a, "keep"_a, "n_youngest"_a, Release(),
-          "Record a frame, keep what it saw (`keep`, and not lost), and settle all but the\n"
+          "Record a frame, store its observations (if `keep`, and not lost), and settle all but "
+          "the\n"
           "youngest frames. Returns the map of the frame.")
       .def("clear", &FrameSightings::clear, "Drop everything.")
       .def("settle", &FrameSightings::settle, "map"_a, "recorder"_a, "n_youngest"_a = 0, Release(),
            "Estimate the recorded poses of all but the youngest frames anew from the points as\n"
            "they are now, and forget those frames. Lost frames, those of living keyframes and\n"
-           "those that no longer agree with half of what they saw stay as they were recorded.\n"
-           "Returns how many have a new pose.");
+           "those that no longer agree with half of what they saw keep their recorded pose. "
+           "Returns the number of new poses.");
 }
 
 void bind_pose_optimization(py::module_& module) {
@@ -135,12 +137,12 @@ void bind_pose_optimization(py::module_& module) {
       "optimize_pose(), then drop the outliers: (inliers, covariance (6, 6), ids (k,) int64 of "
       "the\n"
       "points that were dropped, ascending). Raises StateError without a pose.");
-  module.def(
-      "pose_covariance", &pose_covariance, "frame"_a, py::call_guard<py::gil_scoped_release>(),
-      "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"
-      "translation, left perturbation, for associations that are off by as much as their\n"
-      "keypoints are taken for. Outliers take no part; zero with fewer than 3 others. Raises\n"
-      "StateError when the frame has no pose.");
+  module.def("pose_covariance", &pose_covariance, "frame"_a,
+             py::call_guard<py::gil_scoped_release>(),
+             "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"
+             "translation, left perturbation, from the assumed noise of its keypoints. Outliers "
+             "take no part; zero with fewer than 3 others. Raises\n"
+             "StateError when the frame has no pose.");
   module.def(
       "optimize_pose",
       [](const Pose& T_cw, const Camera& camera, const Input<double>& points,
@@ -268,7 +270,7 @@ void bind_bundle(py::module_& module) {
       .def_readonly("stage_one_done", &BundleSummary::stage_one_done,
                     "The first stage ran to its end.")
       .def_readonly("timed_out", &BundleSummary::timed_out,
-                    "A time limit ended it; what was reached is used.")
+                    "A time limit ended it; the result so far is used.")
       .def_property_readonly(
           "outlier", [](const BundleSummary& s) { return to_array(s.outlier); },
           "Per observation (n,) uint8, judged at the final estimate.");
@@ -378,7 +380,7 @@ void bind_local_bundle(py::module_& module) {
       "local, too, with residuals of the IMU between them; or None. `measures_noise`:\n"
       "alignment_noise() follows the residuals of aligned sightings. Takes the map's locks for\n"
       "short sections only. A\n"
-      "dead or unknown keyframe gives an empty result, a reset meanwhile drops it.");
+      "dead or unknown keyframe gives an empty result, a reset in between drops it.");
 }
 
 void bind_full_bundle_steps(py::module_& module) {
@@ -413,15 +415,17 @@ void bind_full_bundle_steps(py::module_& module) {
       "bundle"_a, py::arg_v("options", FullBundleOptions(), "FullBundleOptions()"),
       "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
       "Refine a gathered bundle; returns a BundleSummary. Takes no lock.\n\n"
-      "`abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached\n"
-      "is not committed. Results that are worse or not finite are not either.");
+      "`abort`: a StopFlag polled once per iteration, or None; the result of an aborted run is "
+      "not\n"
+      "committed, nor is a result that is worse or not finite.");
   module.def("commit_full_bundle", &commit_full_bundle, "map"_a, "bundle"_a,
              py::call_guard<py::gil_scoped_release>(),
              "Move the map to the result in one write section, which counts as a big change.\n\n"
              "Keyframes and points made since the gathering move along with their parents and\n"
-             "reference keyframes; what has died is left out. Nothing is changed when the bundle\n"
-             "is not solved, or when the map was cleared or had another big change since. Keep\n"
-             "local mapping still meanwhile.");
+             "reference keyframes; objects that have died are left out. Nothing is changed when "
+             "the bundle\n"
+             "is not solved, or when the map was cleared or had another big change since. Pause "
+             "local mapping for it.");
 }
 
 void bind_full_bundle(py::module_& module) {
@@ -433,7 +437,7 @@ void bind_full_bundle(py::module_& module) {
       .def_readwrite("iterations", &FullBundleOptions::iterations, "Accepted steps at most.")
       .def_readwrite("robust", &FullBundleOptions::robust, "Huber kernel on all observations.")
       .def_readwrite("max_seconds", &FullBundleOptions::max_seconds,
-                     "No step is begun that would probably end later; what was reached is used.\n"
+                     "No step is begun that would probably end later; the result so far is used.\n"
                      "0: no limit, and results do not depend on the speed of the machine.");
   bind_full_bundle_steps(module);
 }
@@ -446,8 +450,7 @@ void bind_monocular_map(py::module_& module) {
              "Fewer than `min_points` points in the second keyframe.")
       .value("BAD_DEPTH", MonocularMapFailure::kBadDepth,
              "The median depth is not a positive number.")
-      .value("MAP_CLEARED", MonocularMapFailure::kMapCleared,
-             "Somebody cleared the map meanwhile.");
+      .value("MAP_CLEARED", MonocularMapFailure::kMapCleared, "The map was cleared in between.");
   py::class_<MonocularMap>(module, "MonocularMap", "What create_monocular_map did.")
       .def_readonly("ok", &MonocularMap::ok, "There is a map. Otherwise: clear the Map.")
       .def_readonly("failure", &MonocularMap::failure, "Why not.")

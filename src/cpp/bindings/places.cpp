@@ -267,10 +267,10 @@ void bind_keyframe_index(py::module_& module) {
       .def("clear", &KeyFrameIndex::clear, unlocked());
   module.def("index_keyframe", &index_keyframe, py::arg("index"), py::arg("map"), py::arg("id"),
              unlocked(), "Adds a living, described keyframe; a dead one is left out.");
-  module.def(
-      "lowest_neighbour_score", &lowest_neighbour_score, py::arg("map"), py::arg("id"), unlocked(),
-      "The lowest score of a keyframe with a covisible neighbour: what a loop candidate must "
-      "reach. 1 without neighbours.");
+  module.def("lowest_neighbour_score", &lowest_neighbour_score, py::arg("map"), py::arg("id"),
+             unlocked(),
+             "The lowest score of a keyframe with a covisible neighbour: a loop candidate must "
+             "reach it. 1 without neighbours.");
   module.def("find_loop_candidates", &find_loop_candidates, py::arg("index"), py::arg("map"),
              py::arg("id"), py::arg("min_score"), unlocked(),
              "Keyframes not connected to this one that look like it, by ascending id; none when it "

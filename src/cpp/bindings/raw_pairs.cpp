@@ -47,7 +47,8 @@ Eigen::Matrix2Xd each(const Input<double>& pixels,
 
 void bind_rectifier(py::module_& module) {
   py::class_<Rectifier, std::shared_ptr<Rectifier>>(
-      module, "Rectifier", "Makes images of a raw camera those of a pinhole that is turned.")
+      module, "Rectifier",
+      "Rectifies images of a raw camera: resamples them as seen by a rotated pinhole.")
       .def(py::init([](const CameraModel& raw, const Eigen::Matrix3d& R, double fx, double fy,
                        double cx, double cy, int width, int height) {
              return std::make_shared<Rectifier>(raw, R, Pinhole{fx, fy, cx, cy},
@@ -115,7 +116,7 @@ void bind_rectifier(py::module_& module) {
 void bind_raw_pairs(py::module_& module) {
   bind_rectifier(module);
   py::class_<WidePair, std::shared_ptr<WidePair>>(
-      module, "WidePair", "A fisheye pair, which is matched along its epipolar curves.")
+      module, "WidePair", "A fisheye pair, matched along its epipolar curves.")
       .def(py::init([](const std::shared_ptr<Camera>& left, const CameraModel& right,
                        const Eigen::Matrix3d& R, const Eigen::Vector3d& t) {
              return std::make_shared<WidePair>(left, right, Pose(Eigen::Quaterniond(R), t));

@@ -83,7 +83,8 @@ void bind_paths(py::module_& module) {
         return synthetic::room_T_wc(size, seconds, period).matrix();
       },
       "size"_a, "seconds"_a, "period"_a = 30.0,
-      "Camera to world (4, 4) of somebody looking around in a room, once in `period` seconds.");
+      "Camera to world (4, 4) of a person who looks around in a room, one turn in `period` "
+      "seconds.");
   module.def("corridor_way", &synthetic::corridor_way, "length"_a, "breadth"_a, "width"_a,
              "The lap through make_corridor with the same sizes.");
   module.def("figure_eight_way", &synthetic::figure_eight_way, "length"_a, "breadth"_a, "width"_a,

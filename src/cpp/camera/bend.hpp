@@ -9,7 +9,7 @@ namespace orbslam {
 /// OpenCV's coefficients k1, k2, p1, p2, k3, and k4, k5, k6 of the rational model; zeros: unused.
 using Distortion = std::array<double, 8>;
 
-/// Where the lens shows a point, and how that moves with the point.
+/// The point after distortion, and its derivative by the point.
 struct Bent {
   Eigen::Vector2d at;
   Eigen::Matrix2d J;

@@ -53,7 +53,7 @@ void check(const CameraOptions& options) {
   }
 }
 
-/// A calibration may describe the borders badly, but not what is halfway to them.
+/// A calibration may be wrong at the borders, but should hold halfway to them.
 void check_inside(const Camera& camera) {
   const double width = camera.image_size().width, height = camera.image_size().height;
   const Eigen::Vector2d halfway[] = {{width / 4, height / 2},
@@ -147,7 +147,7 @@ Camera::Camera(const CameraOptions& options)
       lens_(lens_of(options_)),
       slots_(slots_of(options_)),
       rig_(!slots_.empty()),
-      // Any camera of a fisheye pair keeps its image as it is.
+      // The images of a fisheye pair are not rectified.
       flat_(!rig_ && orbslam::is_flat(lens_) && options_.right_centre.isZero()),
       distorts_(rig_ ? any_distorts(options_.members)
                      : flat_ && std::holds_alternative<lens_models::PlaneDistortionLens>(lens_)),
@@ -189,7 +189,7 @@ Eigen::Matrix2d Camera::raw_by_plane(double u, double v) const {
   const Pinhole& k = pinhole();
   const auto& lens = std::get<lens_models::PlaneDistortionLens>(lens_);
   Bent bent;
-  // Where the lens shows nothing no error is small.
+  // Where the lens shows nothing, the derivative is NaN, and errors pass no gate.
   if (!lens.distortion.distort(k.to_plane({u, v}), bent)) {
     return Eigen::Matrix2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }

@@ -35,8 +35,8 @@ class Camera;
 struct RigMember {
   std::shared_ptr<const Camera> camera;
   Pose T_bc;  ///< camera to body coordinates [m]
-  /// Points are looked for in its image. False: it has no image, or the image only gives another
-  /// camera its depths.
+  /// True: points are searched in its image. False: it has no image, or its image only gives depths
+  /// to another camera.
   bool active = true;
 };
 
@@ -84,11 +84,11 @@ inline double sight_entry(const Sight& B, std::size_t k) {
 /// by side, and its frame is that of the body. The column of a pixel tells the camera. See
 /// docs/method/frame.md#rigs.
 ///
-/// Immutable, shared by all frames of a system; nothing of it is global.
+/// Immutable, and shared by all frames of a system.
 class Camera {
  public:
-  /// Part of the disparity in the middle below which a keypoint of a fisheye pair has no depth: it
-  /// looks along the baseline.
+  /// Fraction of the disparity in the middle of the image, below which a keypoint of a fisheye pair
+  /// gets no depth, because its ray is nearly parallel to the baseline.
   static constexpr double kLeastShift = 0.2;
   /// Columns between the planes of two cameras of a rig: more than any search window.
   static constexpr int kRigGap = 256;
@@ -118,15 +118,15 @@ class Camera {
   Eigen::Vector3d centre(double u) const {
     return rig_ ? slots_[slot_at(u)].centre : Eigen::Vector3d::Zero();
   }
-  /// Of a rig: the pixel at which one of its cameras sees a point, in its image or beside it.
+  /// The pixel at which one camera of a rig sees a point, inside or outside its image.
   bool project_into(std::size_t camera, const Eigen::Vector3d& p_b, Eigen::Vector2d& uv) const;
-  /// The same rig, where other cameras are active.
+  /// The same rig with other active cameras.
   Camera with_active(const std::vector<bool>& active) const;
   /// Of a flat plane. For a fisheye lens: the pinhole with its scale in the middle.
   const Pinhole& pinhole() const { return options_.pinhole; }
   /// Pixel of a point in the camera frame. False, and `uv` stays, for a point outside of the
-  /// model's domain (of a pinhole: in front of the camera), or with NaN. Bounds are not asked; but
-  /// of a rig it is the active camera in whose image the point is most central.
+  /// model's domain (of a pinhole: in front of the camera), or with NaN. Image bounds are not
+  /// checked. For a rig, the active camera is used in whose image the point is most central.
   bool project(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const {
     if (!flat_) return project_wide(p_c, uv);
     if (!(p_c.z() > 0)) return false;
@@ -183,7 +183,7 @@ class Camera {
     if (rig_) return slot(u).camera->along_epipolar_curve(error, u - slot(u).column, v);
     return wide_pair_ ? along_curve_of_pair(error, u, v) : error.x();
   }
-  /// Pixels by which the (virtual) right camera sees a point shifted; to first order in the inverse
+  /// Disparity [pixels] of a point in the (virtual) right camera; to first order in the inverse
   /// depth for a fisheye lens. The point must be in the domain.
   double disparity(const Eigen::Vector3d& p_c) const;
   /// The same for a keypoint at (u, v) with a depth as unproject() has it.
@@ -193,13 +193,13 @@ class Camera {
   double depth_of_axial(double u, double v, double z) const;
   /// Pixels that the image moves in its middle per radian that the camera turns.
   double pixels_per_radian() const { return pinhole().fx; }
-  /// What pixels of the plane can be.
+  /// Limits of the pixels of the plane.
   const ImageBounds& bounds() const { return bounds_; }
 
-  /// The plane is not the image: the lens bends what a pinhole would show.
+  /// True if the plane is not the image, because the lens distorts.
   bool distorts() const { return distorts_; }
-  /// Pixel of the plane of a raw one. A raw pixel at which the lens can show nothing, because its
-  /// model folds over there, stays as it is.
+  /// Pixel of the plane of a raw one. A raw pixel stays unchanged where the lens model folds over,
+  /// because the lens shows nothing there.
   Eigen::Vector2f from_image(const Eigen::Vector2f& raw) const;
   /// The lens model assigns a direction to this raw pixel.
   bool shows(const Eigen::Vector2d& raw) const;
@@ -237,7 +237,7 @@ class Camera {
   }
   const Slot& slot(double u) const { return slots_[slot_at(u)]; }
   static std::vector<Slot> slots_of(const CameraOptions& options);
-  /// The active camera of a rig in whose image a point is most central; null: none shows it.
+  /// The active camera of a rig in whose image a point is most central; null if no camera sees it.
   const Slot* looking_at(const Eigen::Vector3d& p_b, Eigen::Vector3d& p_c,
                          Eigen::Vector2d& uv) const;
   Eigen::Vector3d unproject_in_rig(double u, double v, double depth) const;
@@ -248,7 +248,7 @@ class Camera {
   Eigen::Matrix3d sight_of_one(double u, double v) const;
   Sight sight_of_rig(double u, double v) const;
   double along_curve_of_pair(const Eigen::Vector2d& error, double u, double v) const;
-  /// How a raw pixel moves with one of the flat plane.
+  /// Derivative of a raw pixel by the pixel of the flat plane.
   Eigen::Matrix2d raw_by_plane(double u, double v) const;
 
   CameraOptions options_;

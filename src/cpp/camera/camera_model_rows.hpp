@@ -16,7 +16,7 @@ using LensModel = std::variant<lens_models::PinholeLens, lens_models::PlaneDisto
                                lens_models::ExtendedUnifiedLens, lens_models::OmnidirectionalLens,
                                lens_models::FieldOfViewLens>;
 
-/// What it shows is on a plane, without or with distortion. Otherwise it is a fisheye lens.
+/// True for a pinhole, with or without distortion; false for a fisheye lens.
 inline bool is_flat(const LensModel& lens) {
   return std::holds_alternative<lens_models::PinholeLens>(lens) ||
          std::holds_alternative<lens_models::PlaneDistortionLens>(lens);

@@ -35,7 +35,7 @@ struct Pinhole {
   }
 };
 
-/// Where a camera shows a point, and how that moves with the point.
+/// The pixel of a point, and its derivative by the point.
 struct Seen {
   Eigen::Vector2d uv;             ///< pixel; of a Camera: undistorted, of a CameraModel: raw
   Eigen::Matrix<double, 2, 3> J;  ///< d uv / d p_c

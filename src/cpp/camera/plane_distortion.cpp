@@ -14,7 +14,7 @@ namespace {
 constexpr int kMostInverseSteps = 50;
 constexpr int kMostInverseHalvings = 30;
 constexpr int kOutwardSteps = 16;
-// Residuals at unit depth: what ends the steps, and what must be reached.
+// Residuals at unit depth: one ends the steps, the other must be reached.
 constexpr double kInverseGoal = 1e-14;
 constexpr double kInverseTolerance = 1e-10;
 
@@ -50,8 +50,8 @@ constexpr double kFirstRadius = 0.01, kRadiusStep = 1.02;
 constexpr int kRadii = 700;  // the last one is 1e4: 0.006 degrees from the plane z = 0
 constexpr int kDirections = 64;
 
-/// The smallest radius at which the distortion is one-to-one again, in any direction, after it was
-/// not: beyond it would be points of which the model shows images of nearer ones.
+/// The smallest radius, over all directions, at which the distortion becomes one-to-one again.
+/// Points beyond it have the same pixels as nearer points.
 double second_part(const PlaneDistortion& distortion) {
   double smallest = kFirstRadius * std::pow(kRadiusStep, kRadii);
   for (int i = 0; i < kDirections; ++i) {
@@ -89,7 +89,7 @@ PlaneDistortion::PlaneDistortion(const std::array<double, 12>& coefficients)
 // Begins at the solution of the radial part alone. Where strong tangential terms lead astray,
 // begins at the axis and follows the point outwards.
 bool PlaneDistortion::undistort(const Eigen::Vector2d& bent, Eigen::Vector2d& straight) const {
-  // Not the end itself, which may be a pole of the rational model.
+  // The end itself is excluded: it may be a pole of the rational model.
   const double radius = bent.norm(), end = (1 - 1e-9) * std::sqrt(largest_r2_);
   if (!std::isfinite(radius)) return false;
   straight.setZero();
@@ -108,7 +108,7 @@ bool PlaneDistortion::undistort(const Eigen::Vector2d& bent, Eigen::Vector2d& st
   return true;
 }
 
-// A step is halved until it stays in the domain and comes nearer.
+// A step is halved until it stays in the domain and lowers the residual.
 bool PlaneDistortion::approach(const Eigen::Vector2d& bent, Eigen::Vector2d& straight) const {
   Bent there;
   if (!distort(straight, there)) return false;

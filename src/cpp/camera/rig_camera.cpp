@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Camera: what several cameras see.
+// Camera: the methods for rigs of several cameras.
 #include <algorithm>
 #include <cmath>
 #include <limits>

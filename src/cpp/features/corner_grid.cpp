@@ -115,7 +115,7 @@ void CornerGrid::collect_cell(const Layout& layout, int band, int column, int in
     Corner corner = cell_[static_cast<std::size_t>(i)];
     corner.x = static_cast<std::uint16_t>(corner.x + left);
     corner.y = static_cast<std::uint16_t>(corner.y + top);
-    // A forbidden corner must not silence the weak ones of its cell either.
+    // A forbidden corner must not suppress the weak corners of its cell either.
     if (!mask.allows(corner.x + corner_origin, corner.y + corner_origin)) continue;
     const bool strong = corner.response >= initial_threshold;
     if (strong && !has_strong) corners_.resize(cell_begin);

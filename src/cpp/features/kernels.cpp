@@ -22,7 +22,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// As many pixels as there is room for, and half as many numbers twice as long.
+/// Vector types: 8-bit pixels that fill a vector, and half as many 16-bit numbers.
 using Pixels = hn::ScalableTag<std::uint8_t>;
 using PixelVector = hn::Vec<Pixels>;
 using Words = hn::ScalableTag<std::int16_t>;
@@ -42,7 +42,7 @@ struct Higher {
   static HWY_INLINE PixelVector of(PixelVector a, PixelVector b) { return hn::Max(a, b); }
 };
 
-/// Of each lane: the outermost over all arcs of 9 circle pixels of the innermost in the arc. With
+/// Per lane: the largest minimum (or smallest maximum) over all arcs of 9 circle pixels. With
 /// <Lower, Higher> the brightest arc, with <Higher, Lower> the darkest one.
 template <class Inner, class Outer>
 HWY_INLINE PixelVector best_arc(const PixelVector (&pixel)[16]) {
@@ -252,8 +252,8 @@ HWY_INLINE hn::Vec<Integers> blur_every_other(const std::int16_t* sums) {
   add(2, blur_taps[2], blur_taps[3]);
   add(4, blur_taps[4], blur_taps[5]);
   add(6, blur_taps[6], 0);
-  // The sums lack 32768, and the taps add up to 256: 256 * 32768 comes back with the rounding
-  // constant.
+  // The sums were stored minus 32768, and the taps add up to 256. The rounding constant adds 256 *
+  // 32768 back.
   return hn::Add(hn::RearrangeToOddPlusEven(low, high), hn::Set(d32, (256 << 15) + (1 << 15)));
 }
 

@@ -8,9 +8,9 @@
 
 namespace orbslam {
 
-/// Chooses corners spread over an area: it is divided into quarters until there are about as many
-/// boxes as corners wanted, then the strongest corner of each box is kept. See
-/// docs/method/features.md#even-distribution.
+/// Chooses corners that are spread over an area. The area is divided into quarters until the number
+/// of boxes reaches about the number of wanted corners. Then the strongest corner of each box is
+/// kept. See docs/method/features.md#even-distribution.
 class Quadtree {
  public:
   /// `corners` lie in [0, width) x [0, height). Returns about `quota` of them, at most

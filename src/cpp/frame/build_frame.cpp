@@ -25,7 +25,7 @@ std::vector<Keypoint> undistorted(const Camera& camera, const std::vector<Keypoi
   return keypoints;
 }
 
-// Everything but depth; a frame without keypoints is as complete as any other.
+// Fills everything but the depths. A frame may have no keypoints.
 std::shared_ptr<Frame> frame_of(const FrameContext& context, FrameId id, double timestamp,
                                 Features features) {
   auto frame = std::make_shared<Frame>();
@@ -125,7 +125,7 @@ std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id,
   const cv::Mat metres = to_depth_metres(depths_at(depth, raw, rounding), factor);
   for (std::size_t i = 0; i < raw.size(); ++i) {
     const float z = metres.at<float>(static_cast<int>(i));
-    // Some drivers write infinity for "too far", which is as good as no measurement.
+    // Some drivers write infinity for "too far"; it counts as no measurement.
     if (!(z > 0.0F) || !std::isfinite(z)) continue;
     const Keypoint& keypoint = frame->keypoints[i];
     const auto metric = static_cast<float>(camera.depth_of_axial(keypoint.x, keypoint.y, z));

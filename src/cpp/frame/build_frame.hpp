@@ -10,7 +10,7 @@
 
 namespace orbslam {
 
-/// What all frames of one system share.
+/// Camera, extractors and parameters that all frames of one system share.
 struct FrameContext {
   std::shared_ptr<const Camera> camera;
   std::shared_ptr<const ScalePyramid> scales;

@@ -18,8 +18,8 @@
 
 namespace orbslam {
 
-/// What one image (pair) says, without any interpretation: features, depths, words. Built once,
-/// then shared read-only by the tracker and the keyframe made from it.
+/// Measurements of one image (or pair): features, depths, words. It holds no pose and no map
+/// points. It is built once, then shared read-only by the tracker and the keyframe made from it.
 struct Frame {
   FrameId id = -1;
   double timestamp = 0;  ///< seconds, as given by the caller
@@ -38,15 +38,16 @@ struct Frame {
   /// Of each right column that was aligned (frame/right_alignment.hpp), else 0 [px^2]; may be
   /// empty.
   std::vector<float> right_variance;
-  std::shared_ptr<FrameImages> images;  ///< null: nobody aligns patches in this frame
-  SmallImage small_image;  ///< of the image, the left one of a pair; empty when nobody kept it
+  std::shared_ptr<FrameImages> images;  ///< null: patches are not aligned in this frame
+  SmallImage small_image;  ///< of the image, the left one of a pair; empty when it was not kept
 
   WordVector words;          ///< filled by describe() (places/), before the frame is shared
   DirectIndex direct_index;  ///< same
   bool described = false;
 
   std::size_t size() const { return keypoints.size(); }
-  /// The one test of "is a stereo observation": a virtual right column may be negative.
+  /// True if keypoint i has a depth. Test depths and not right columns: a virtual right column may
+  /// be negative.
   bool has_depth(std::size_t i) const { return depth[i] > 0.0F; }
   /// The depth can be trusted from one view: see docs/method/frame.md#close-and-far-points.
   bool is_close(std::size_t i) const {
@@ -56,7 +57,7 @@ struct Frame {
   Eigen::Vector3d unproject(std::size_t i) const {
     return camera->unproject(keypoints[i].x, keypoints[i].y, depth[i]);
   }
-  /// Where the camera that shows keypoint i is in the world, at a pose of the frame.
+  /// Centre (world) of the camera that keypoint i belongs to, for a pose of the frame.
   Eigen::Vector3d center_of(std::size_t i, const Pose& T_cw) const {
     if (!camera->is_rig()) return T_cw.center();
     return T_cw.rotation().conjugate() * (camera->centre(keypoints[i].x) - T_cw.translation());
@@ -79,7 +80,7 @@ struct Anchor {
   MapIndex map = kNoMap;         ///< KeyFrame::map of it
 };
 
-/// Where a keypoint of a tracked frame sees its map point by the point's patch.
+/// Pixel of a map point in a tracked frame, found by alignment of the point's patch.
 struct AlignedPixel {
   MapPointId point;  ///< invalid: not aligned
   float u = 0, v = 0, right_u = 0;
@@ -87,7 +88,8 @@ struct AlignedPixel {
   float right_factor = 1;    ///< inverse variance of the right column over that
 };
 
-/// A frame in the tracker's hands: pose and associations, which change while it is tracked.
+/// A frame with what tracking estimates of it: its pose, and the map point of each keypoint.
+/// `frame` holds the measurements: keypoints, descriptors and depths.
 struct TrackedFrame {
   std::shared_ptr<const Frame> frame;
   std::optional<Pose> T_cw;
@@ -98,8 +100,8 @@ struct TrackedFrame {
   std::vector<MapPointId> map_points;
   std::vector<Eigen::Vector3d> positions;
   std::vector<std::uint8_t> outlier;
-  /// Where some keypoints see their points by patches; empty, or one per keypoint. An entry counts
-  /// as long as its keypoint keeps that point.
+  /// Pixels of some keypoints by alignment of patches; empty, or one entry per keypoint. An entry
+  /// is valid as long as its keypoint keeps the same point.
   std::vector<AlignedPixel> aligned;
 
   explicit TrackedFrame(std::shared_ptr<const Frame> f)
@@ -120,7 +122,7 @@ struct TrackedFrame {
     outlier[i] = 0;
   }
   void clear_associations();
-  /// Null where the keypoint, and not its patch, says where the point is seen.
+  /// The aligned pixel of keypoint `i`; null if the observation uses the keypoint's own pixel.
   const AlignedPixel* aligned_at(std::size_t i) const {
     const bool is_aligned =
         !aligned.empty() && aligned[i].point.valid() && aligned[i].point == map_points[i];
@@ -136,8 +138,8 @@ struct TrackedFrame {
   std::size_t n_associated() const;
   /// Inliers among them that are points of the map, not temporary ones.
   std::size_t n_map_inliers() const;
-  /// Over the close keypoints; both 0 without depth. Tells whether a keyframe is needed to bring
-  /// new close points into the map.
+  /// Over the close keypoints; both 0 without depth. They decide whether a keyframe is needed for
+  /// new close points.
   CloseCounts n_close_tracked_untracked() const;
 };
 

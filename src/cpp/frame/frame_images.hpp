@@ -10,7 +10,8 @@
 namespace orbslam {
 
 /// The image pyramids of a frame, while patches are still compared in them. A frame is shared
-/// between threads; the images may be released at any time, and whoever got them keeps them.
+/// between threads; the images may be released at any time, but a pointer that was handed out keeps
+/// them alive.
 class FrameImages {
  public:
   struct Pyramids {

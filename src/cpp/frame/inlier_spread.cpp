@@ -15,10 +15,11 @@ namespace {
 
 constexpr int kSpreadCells = kSpreadColumns * kSpreadRows;
 constexpr int kPoseParameters = 6;
-/// 95 % of chi-square, three degrees of freedom: an aligned sighting beyond it held no pose.
+/// 95 % of chi-square, three degrees of freedom: aligned sightings beyond it did not influence the
+/// pose.
 constexpr double kAlignedGate = 7.815;
 
-/// Where a keypoint's point is seen, and how well.
+/// Measured pixel of a keypoint's point, and its weight.
 AlignedPixel sighting_of(const TrackedFrame& tracked, std::size_t i) {
   if (const AlignedPixel* aligned = tracked.aligned_at(i)) return *aligned;
   const Frame& frame = *tracked.frame;

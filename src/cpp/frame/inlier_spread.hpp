@@ -11,7 +11,7 @@ inline constexpr int kSpreadRows = 6;
 /// Cells that the classical covariance counts as beside the cluster-robust one.
 inline constexpr int kPriorCells = 12;
 
-/// How the inliers of a pose are spread over the image, and what that says of its covariance.
+/// Distribution of a pose's inliers over the image, and the cluster-robust covariance from it.
 struct InlierSpread {
   int cells = 0;    ///< of kSpreadColumns x kSpreadRows that hold an inlier
   int octaves = 0;  ///< of depth that hold one: [1, 2), [2, 4), [4, 8)... of the map's units
@@ -26,18 +26,18 @@ struct InlierSpread {
 ///
 /// The covariance is the sandwich H^-1 (sum of g_c g_c') H^-1 over the cells c, with the gradient
 /// g_c of a cell's residuals and the normal matrix H (K.-Y. Liang and S. Zeger, "Longitudinal Data
-/// Analysis Using Generalized Linear Models", Biometrika 1986). Few cells tell little of their
-/// scatter: the classical covariance counts as kPriorCells more of them, and the pose takes six.
-/// See docs/method/tracking.md#stated-covariance.
+/// Analysis Using Generalized Linear Models", Biometrika 1986). With few cells their scatter is
+/// poorly known. Therefore the classical covariance counts as kPriorCells further cells, and the
+/// six unknowns of the pose are subtracted. See docs/method/tracking.md#stated-covariance.
 InlierSpread spread_of_inliers(const TrackedFrame& frame);
 
-/// How many of these keypoints show points that a camera at `T_nw` would still have in its image:
-/// what is not about to leave the view. See docs/method/tracking.md#new-keyframes.
+/// Number of these keypoints whose points are still in the image of a camera at `T_nw`. See
+/// docs/method/tracking.md#new-keyframes.
 int count_staying(const TrackedFrame& frame, const Pose& T_nw);
 
-/// Median distance in the image between where the points of these keypoints are and where a camera
-/// at `T_nw` has them, pixels; what lies behind either is left out, 0 without any. Throws
-/// StateError when the frame has no pose.
+/// Median distance [pixels] between the pixels of these keypoints' points in the frame and in a
+/// camera at `T_nw`. Points behind either camera are left out; 0 without points. Throws StateError
+/// when the frame has no pose.
 double median_displacement(const TrackedFrame& frame, const Pose& T_nw);
 
 }  // namespace orbslam

@@ -20,7 +20,7 @@ void append_shifted(std::vector<Keypoint> keypoints, float column, std::vector<K
   append(keypoints, to);
 }
 
-/// The keypoints of one camera with all that belongs to each of them.
+/// The keypoints of one camera, with the data of each.
 void append_features(const Frame& from, float column, bool distorts, Frame& to) {
   append_shifted(from.keypoints, column, to.keypoints);
   if (distorts) {

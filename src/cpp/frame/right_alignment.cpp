@@ -18,11 +18,11 @@ constexpr std::size_t kChunk = 128;
 /// Most rows by which the right image may be off its rectification [pixels of the level].
 constexpr double kMostRows = 1.5;
 
-/// Most rows by which the two images of a pair may usually differ [pixels of the level]: where the
-/// rectification is worse than that, a column is no better than its parabola, and sightings that
-/// are aligned between frames bend the map by the same errors.
+/// Most rows by which the two images of a pair may usually differ [pixels of the level]: with a
+/// worse rectification an aligned column is no better than the parabola, and sightings that are
+/// aligned between frames distort the map by the same errors.
 constexpr float kMostRowError = 0.1F;
-/// Fewest keypoints that say something of the rows.
+/// Least number of keypoints for the comparison of rows.
 constexpr std::size_t kFewestRows = 30;
 
 struct Aligned {

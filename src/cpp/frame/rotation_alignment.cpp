@@ -152,7 +152,7 @@ struct SmallPlane {
   }
 
   Eigen::Matrix3d turned_by(const Eigen::Vector2i& shift) const {
-    // What moves to the right and down in the image turns about +y and -x in the camera.
+    // A shift to the right (down) in the image is a rotation about +y (-x) of the camera.
     const Eigen::AngleAxisd yaw(std::atan(shift.x() / pinhole.fx), Eigen::Vector3d::UnitY());
     const Eigen::AngleAxisd pitch(-std::atan(shift.y() / pinhole.fy), Eigen::Vector3d::UnitX());
     return (yaw * pitch).toRotationMatrix();

@@ -29,7 +29,7 @@ constexpr float kSmallestDisparity = 0.01F;
 // 1.5 * 1.4, after the usual robust estimate of a standard deviation from a median.
 constexpr float kOutlierFactor = 2.1F;
 
-// What the coarse search reads of a right keypoint, without a detour through the keypoint list.
+// The fields of a right keypoint that the coarse search reads, in one array for speed.
 struct Candidate {
   float u;
   std::int32_t level;

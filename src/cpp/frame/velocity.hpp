@@ -17,28 +17,29 @@ struct Velocity {
 
   /// The motion over another interval; over more than a second, that over a second.
   Pose over(double interval) const;
-  /// After lengths have been multiplied by a factor.
+  /// The velocity after the map was scaled by a factor.
   Velocity scaled(double factor) const;
 };
 
-/// The motion `T_cl` between two frames; nothing without a pose of either.
+/// The motion `T_cl` between two frames; none if either has no pose.
 std::optional<Pose> motion_between(const TrackedFrame& last, const TrackedFrame& frame);
 
-/// The velocity between two frames; nothing without a pose of either. `consecutive`: nothing either
-/// unless the second is the next image, and no loop has been closed between them.
+/// The velocity between two frames; none if either has no pose. With `consecutive`, also none
+/// unless the second frame is the next image and no loop was closed between them.
 std::optional<Velocity> velocity_between(const TrackedFrame& last, const TrackedFrame& frame,
                                          bool consecutive);
 
-/// Sets the pose of a frame by constant velocity; without one, to that of the last frame. It is
-/// relative to the same keyframe as that. Throws StateError when the last frame has no pose.
+/// Sets the pose of a frame by constant velocity, or to the pose of the last frame without a
+/// velocity. The pose is relative to the last frame's reference keyframe. Throws StateError when
+/// the last frame has no pose.
 void predict_pose(TrackedFrame& frame, const TrackedFrame& last, const Velocity* velocity);
 
-/// The tangent (rotation, translation) from the pose of a frame to the predicted one; nothing
-/// without a pose of either frame.
+/// The tangent (rotation, translation) from the pose of a frame to the predicted pose; none if
+/// either frame has no pose.
 std::optional<Vector6d> innovation(const TrackedFrame& frame, const TrackedFrame& last,
                                    const Velocity& velocity);
 
-/// How far the pose of a frame is from the predicted one.
+/// Difference between the pose of a frame and the predicted pose.
 struct PoseChange {
   double turn = 0;  ///< radians
   double move = 0;  ///< between the centres
@@ -48,7 +49,7 @@ struct PoseChange {
 PoseChange change_from_prediction(const TrackedFrame& frame, const TrackedFrame& last,
                                   const Velocity* velocity);
 
-/// What tracking knows of errors of a pose that its residuals do not show.
+/// Sources of pose errors that the residuals do not show.
 struct HiddenErrors {
   const Velocity* velocity = nullptr;  ///< predicts the frame's pose
   const Pose* map_motion = nullptr;    ///< of the map under the last frame, since it was tracked
@@ -60,8 +61,8 @@ struct HiddenErrors {
 Matrix6d stated_covariance(const Matrix6d& covariance, double factor, const TrackedFrame& frame,
                            const TrackedFrame& last, const HiddenErrors& hidden);
 
-/// How many inliers of a frame are still in its image after so many intervals of a velocity; see
-/// count_staying(). Throws StateError without a pose.
+/// Number of inliers of a frame that are still in the image after a number of intervals of a
+/// velocity; see count_staying(). Throws StateError without a pose.
 int count_staying_after(const TrackedFrame& frame, const Velocity& velocity, double n_intervals);
 
 }  // namespace orbslam

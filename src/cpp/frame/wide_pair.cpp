@@ -36,7 +36,7 @@ constexpr std::size_t kKeypointsPerTask = 64;  // keypoints per task
 
 double wrapped(double angle) { return std::remainder(angle, 2 * kHalfTurn); }
 
-/// How the unit ray moves with the pixel, from how the pixel moves with the point on the ray.
+/// Derivative of the unit ray by the pixel, from the derivative of the pixel by the point.
 Eigen::Matrix<double, 3, 2> ray_by_pixel(const Eigen::Matrix<double, 2, 3>& J) {
   return J.transpose() * (J * J.transpose()).inverse();
 }
@@ -90,7 +90,7 @@ class WidePair::Search {
     });
   }
 
-  /// Depth along the ray of a left keypoint and its disparity; none if it has no match.
+  /// Depth along the ray of a left keypoint, and its disparity; none without a match.
   std::optional<std::pair<double, double>> depth_of(std::size_t i) const {
     const Keypoint& keypoint = left_.features.keypoints[i];
     const Camera& camera = pair_.left();
@@ -197,8 +197,8 @@ class WidePair::Search {
     return found->angle;
   }
 
-  /// Mean distance of the right patch from its affine map: lenses bend it, and cameras that look in
-  /// different directions differently. In the right image [px].
+  /// Mean deviation [px, right image] of the right patch from its affine map. It is caused by the
+  /// lenses, and by different viewing directions of the cameras.
   Eigen::Vector2d bend_of_patch(const Eigen::Vector2d& left_pixel, const Eigen::Vector2d& scale,
                                 double depth, const Eigen::Vector2d& right_pixel,
                                 const Eigen::Matrix2d& warp) const {
@@ -253,7 +253,7 @@ WidePair::Direction WidePair::direction(const Eigen::Vector3d& ray_in_left,
   const double plane = std::atan2(a.z(), a.y());
   const Eigen::Vector3d outwards = std::cos(plane) * axes_.row(1) + std::sin(plane) * axes_.row(2);
   const Eigen::Vector3d across = axes_.row(0).transpose().cross(outwards);
-  // How the ray moves when its angle grows.
+  // Derivative of the ray by its angle.
   const Eigen::Vector3d along = a.x() * outwards - sine * axes_.row(0).transpose();
   return {plane, std::atan2(sine, a.x()), sine, (J * (R_camera_left * across)).norm(),
           (J * (R_camera_left * along)).norm()};

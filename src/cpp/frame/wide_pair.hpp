@@ -12,9 +12,9 @@
 
 namespace orbslam {
 
-/// A pair of cameras with any lenses, which is matched as it is. Every direction is described by
-/// its epipolar plane (an angle around the baseline) and its angle from the baseline. Both cameras
-/// see a point in one plane, the right one at an angle that is larger by the parallax.
+/// A pair of cameras with any lenses, matched without rectification. Every direction is described
+/// by its epipolar plane (an angle around the baseline) and its angle from the baseline. Both
+/// cameras see a point in one plane, the right one at an angle that is larger by the parallax.
 class WidePair {
  public:
   /// `left` must have a wide pair, whose centre is that of `T_right_left` (left to right camera

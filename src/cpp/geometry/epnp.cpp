@@ -149,7 +149,7 @@ Eigen::Vector2d two_from_products(double b11, double b12, double b22) {
   return {b12 < 0 ? -b_1 : b_1, b_2};
 }
 
-/// Three starting points, from ever other subsets of the products.
+/// Three starting points, each from another subset of the products.
 std::array<Eigen::Vector4d, 3> initial_guesses(const DistanceForms& forms, const Distances& rho) {
   std::array<Eigen::Vector4d, 3> guesses;
   {
@@ -198,7 +198,8 @@ Pose absolute_orientation(const Points& points, const Eigen::Matrix3Xd& camera_p
   const Eigen::Matrix3d H =
       (camera_points.colwise() - mean_c) * (points.colwise() - mean_w).transpose();
   Svd3 svd = svd_3(H);
-  // The least significant direction gives way, which for points on a plane costs nothing.
+  // The direction with the smallest singular value is flipped, which does not matter for points on
+  // a plane.
   if ((svd.U * svd.V.transpose()).determinant() < 0) svd.U.col(2) = -svd.U.col(2);
   const Eigen::Matrix3d R = svd.U * svd.V.transpose();
   return Pose(R, mean_c - R * mean_w);
@@ -211,7 +212,7 @@ double mean_error(const Pose& T_cw, const Points& points, const Pixels& pixels,
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Vector3d p_c = R * points.col(i) + T_cw.translation();
     const Eigen::Vector3d q = apply(camera.sight(pixels(0, i), pixels(1, i)), p_c);
-    // Of a fisheye lens what lies behind the ray has an image of its own.
+    // A fisheye lens also shows points behind the image plane, at other pixels.
     if (!camera.is_flat() && !(q.z() > 0)) return std::numeric_limits<double>::infinity();
     sum += q.head<2>().norm() / std::abs(q.z());
   }

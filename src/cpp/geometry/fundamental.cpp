@@ -45,7 +45,7 @@ Eigen::Matrix3d nearest_of_rank_2(const Eigen::Matrix3d& matrix) {
   return svd.U * Eigen::Vector3d(d[0], d[1], 0).asDiagonal() * svd.V.transpose();
 }
 
-/// Of unit rays, which need no normalisation.
+/// The same from unit rays, which need no normalisation.
 Eigen::Matrix3d fit_to_rays(const PointPairs& pairs, const EightPairs& sample) {
   Eigen::Matrix<double, 9, 8> A;
   for (std::size_t k = 0; k < sample.size(); ++k) {

@@ -36,7 +36,7 @@ void transfer_errors(const Eigen::Matrix3d& H, const std::vector<HomogeneousPoin
   }
 }
 
-/// Of unit rays, which need no normalisation.
+/// The same from unit rays, which need no normalisation.
 Eigen::Matrix3d fit_to_rays(const PointPairs& pairs, const EightPairs& sample) {
   Eigen::Matrix<double, 16, 9> A;
   for (std::size_t k = 0; k < sample.size(); ++k) {

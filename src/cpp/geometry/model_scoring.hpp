@@ -13,8 +13,8 @@ struct PairErrors {
   Eigen::ArrayXd in_1, in_2;
 };
 
-/// When a direction counts, and with how much: `credit` minus its error. See
-/// docs/method/start.md#homography-or-fundamental-matrix.
+/// Score of one direction of a pair: `credit` minus its squared error, if that is below the limit.
+/// See docs/method/start.md#homography-or-fundamental-matrix.
 struct ErrorGate {
   double limit = 0;
   double credit = 0;

@@ -21,7 +21,7 @@ struct MotionSupport {
 
 /// Triangulates the pairs flagged in `inliers` and judges each. A pair is good when the squared
 /// reprojection errors are at most `max_squared_error` [pixels^2] and both depths are positive;
-/// where there is next to no parallax the sign of a depth says nothing and is not asked for. See
+/// with almost no parallax the sign of a depth is random and is not checked. See
 /// docs/method/start.md#choosing-the-motion.
 MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
                            const std::vector<std::uint8_t>& inliers, const Camera& camera,

@@ -17,7 +17,7 @@ std::size_t best_of(const std::vector<MotionScore>& scores) {
   return static_cast<std::size_t>(best - scores.begin());
 }
 
-// Low parallax is named before ambiguity: it is the cause of it where both hold.
+// Low parallax is reported before ambiguity, because it causes ambiguity.
 TwoViewOutcome judge(bool enough_points, bool enough_parallax, bool unique) {
   if (!enough_points) return TwoViewOutcome::too_few_points;
   if (!enough_parallax) return TwoViewOutcome::low_parallax;

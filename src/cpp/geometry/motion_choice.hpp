@@ -8,7 +8,7 @@
 
 namespace orbslam {
 
-/// What one motion hypothesis achieved (see MotionSupport).
+/// Support of one motion hypothesis (see MotionSupport).
 struct MotionScore {
   std::size_t n_good = 0;
   double parallax = 0;  ///< degrees

@@ -121,7 +121,7 @@ std::optional<PnpPose> PnpRansac::refine_best() const {
                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
   std::optional<PnpPose> refined = pose_of(*most);
   if (refined) refined->refined = true;
-  // A part of the inliers may say less than a lucky sample.
+  // The pose refined on a part of the inliers may be worse than that of the sample.
   if (problem_.camera->is_rig() && (!refined || refined->n_inliers < best_.n_inliers)) return best_;
   return refined;
 }

@@ -10,9 +10,9 @@
 
 namespace orbslam {
 
-/// A keypoint as homogeneous coordinates h of its image, and what compares others with it: the
-/// error of h' is ((B h')_0, (B h')_1) / (B h')_2 in raw pixels. Of a flat plane h is (u, v, 1), of
-/// a fisheye lens the unit ray.
+/// A keypoint as homogeneous coordinates h of its image, and the matrix B that compares others with
+/// it: the error of h' is ((B h')_0, (B h')_1) / (B h')_2 in raw pixels. Of a flat plane h is (u,
+/// v, 1), of a fisheye lens the unit ray.
 struct HomogeneousPoint {
   Eigen::Vector3d h;
   Eigen::Matrix3d B;
@@ -30,7 +30,8 @@ struct PointPairs {
   void resize(std::size_t count);
 };
 
-/// What h has to be multiplied by to give directions: the calibration matrix of a flat plane, or 1.
+/// The matrix that relates h to directions: the calibration matrix of a flat plane, or the
+/// identity.
 Eigen::Matrix3d calibration_of(const Camera& camera);
 
 /// Adds the homogeneous points of a camera that is no pinhole.
@@ -57,10 +58,10 @@ struct Normalization {
   Eigen::Matrix3d inverse() const;
 };
 
-/// False when the points lie on one column or row, or there are none: nothing to scale by.
+/// False when there are no points or all lie on one row or column, so that no scale is defined.
 bool normalize(const std::vector<Eigen::Vector2f>& points, Normalization& normalization);
 
-/// A model and what it explains.
+/// A model and its inliers.
 struct ScoredModel {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
   double score = 0;                   ///< 0: no model explains anything

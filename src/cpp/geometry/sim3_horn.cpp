@@ -10,7 +10,8 @@
 namespace orbslam {
 namespace {
 
-// A set that extends less across than this part of its length leaves the turn about it open.
+// A set whose width is below this fraction of its length does not determine the rotation about its
+// line.
 constexpr double kMinExtentRatio = 1e-6;
 
 /// Extents are measured along and across the line through the mean and the farthest point: the

@@ -24,7 +24,7 @@ struct Factors {
     for (int k = 0; k < N; ++k) {
       double pivot = M(k, k);
       for (int j = 0; j < k; ++j) pivot -= L(k, j) * L(k, j) * d[j];
-      // What the last one has lost in rounding decides nothing: its direction is what is wanted.
+      // The rounding of the last pivot does not matter: its direction is the wanted one.
       if (k == N - 1 && pivot < floor) pivot = floor;
       if (!(pivot >= floor) || !(pivot > 0)) return false;
       d[k] = pivot;
@@ -52,7 +52,7 @@ struct Factors {
   }
 };
 
-/// False if it does not settle: another eigenvalue is as small, or the matrix is out of order.
+/// False if it does not converge: another eigenvalue is as small, or the matrix is invalid.
 template <int N>
 bool iterate(const Eigen::Matrix<double, N, N>& matrix, Eigen::Matrix<double, N, 1>& vector) {
   Factors<N> factors;

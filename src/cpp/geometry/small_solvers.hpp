@@ -6,8 +6,8 @@
 namespace orbslam {
 
 // Decompositions of small matrices, compiled once: one of them costs the compiler as much as a
-// dozen sources, and each file that names it would pay again. Of sizes that are solved for in the
-// thousands there is one of its own.
+// dozen sources, and each file that names it would pay again. Sizes that are solved thousands of
+// times have a function of their own.
 
 /// Of at most 12 x 12, on the stack. Sizes known to be small, but not unrolled: fully unrolled
 /// eigen solvers take the compiler minutes and gigabytes under the sanitizers, and are no faster.

@@ -17,7 +17,7 @@ namespace {
 constexpr double homography_threshold = 0.40;
 constexpr double general_scene = 1.1;  // matches of F by those of H, from which on it is no plane
 constexpr double max_chi2 = 4.0;       // squared reprojection error over sigma^2 of a good pair
-constexpr double alternative_share = 0.5;  // of the best motion's points, that others must place
+constexpr double alternative_share = 0.5;  // least share of the best motion's points
 constexpr std::size_t sample_size = std::tuple_size_v<EightPairs>;
 
 void check_options(const TwoViewOptions& options) {
@@ -203,8 +203,8 @@ TwoViewResult reconstruct(const TwoViewInput& input, const TwoViewOptions& optio
   result.model = result.homography_ratio > homography_threshold ? TwoViewModel::homography
                                                                 : TwoViewModel::fundamental;
   recover_motion(models, pairs, input, options, helper, result);
-  // A plane that fills much of the view makes a homography win that knows no way out of its two
-  // motions, although the rest of the matches tells them apart.
+  // If a plane fills much of the view, the homography wins. It leaves two motions, although the
+  // matches beside the plane would decide between them.
   const auto least = general_scene * static_cast<double>(models.homography.n_inliers);
   if (result.outcome == TwoViewOutcome::ambiguous_motion &&
       result.model == TwoViewModel::homography &&

@@ -30,7 +30,7 @@ struct TwoViewInput {
   const Camera& camera;                         ///< of both views
 };
 
-/// A motion that explains the matches, and what it places.
+/// A motion that explains the matches, and the points that it triangulates.
 struct TwoViewMotion {
   Pose T_21;            ///< camera 1 to camera 2 with |translation| = 1
   double parallax = 0;  ///< degrees
@@ -39,8 +39,8 @@ struct TwoViewMotion {
   std::vector<std::uint8_t> triangulated;  ///< the point is well placed: use it
 };
 
-/// The motion and the points, or why there are none; and in either case what was found on the
-/// way, as far as it went.
+/// The motion and the points, or the reason for failure; and the intermediate results in both
+/// cases.
 struct TwoViewResult {
   TwoViewOutcome outcome = TwoViewOutcome::too_few_matches;
   TwoViewModel model = TwoViewModel::none;  ///< the one that was chosen
@@ -62,9 +62,10 @@ struct TwoViewResult {
   // Per initial keypoint, as soon as the models were estimated.
   std::vector<std::uint8_t> homography_inlier, fundamental_inlier;
 
-  /// Where the motion is ambiguous: all that place at least half as many points as the best, also
-  /// with little parallax, in the order of `hypotheses`. Further views can tell them apart: from
-  /// two views of a plane follow two motions, of which only one agrees with all others.
+  /// If the motion is ambiguous: all motions that triangulate at least half as many points as the
+  /// best one, also with little parallax, in the order of `hypotheses`. Further views can decide
+  /// between them: two views of a plane allow two motions, and only one of these agrees with all
+  /// other views.
   std::vector<TwoViewMotion> alternatives;
 
   bool success() const { return outcome == TwoViewOutcome::reconstructed; }
@@ -87,9 +88,9 @@ TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOpti
 TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOptions& options,
                                     const std::vector<EightPairs>& samples, WorkerThread* helper);
 
-/// What a motion that is known already places: all matches that fit it, by the rules of
-/// reconstruct_two_views. The length of T_21's translation becomes 1; throws std::invalid_argument
-/// when it is 0, and for matches that do not fit the points.
+/// Triangulates all matches that agree with a known motion, by the rules of reconstruct_two_views.
+/// The length of T_21's translation becomes 1; throws std::invalid_argument when it is 0, and for
+/// matches that do not fit the points.
 TwoViewMotion place_points(const TwoViewInput& input, const Pose& T_21, double sigma);
 
 }  // namespace orbslam

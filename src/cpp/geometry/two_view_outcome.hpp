@@ -10,7 +10,7 @@ enum class TwoViewOutcome {
   too_few_matches,    ///< fewer than TwoViewOptions::min_matches
   degenerate_points,  ///< the keypoints of a view lie on one row or column
   no_model,           ///< no sample gave a model that explains anything
-  degenerate_plane,   ///< homography chosen, but it does not tell motion from rotation
+  degenerate_plane,   ///< homography chosen, but it may be a pure rotation
   too_few_points,     ///< the best motion places too few of the inliers
   low_parallax,       ///< the views are too close together for the scene's distance
   ambiguous_motion,   ///< a second motion explains the matches nearly as well

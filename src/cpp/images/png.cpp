@@ -35,7 +35,7 @@ struct Chunk {
   std::size_t size = 0;
 
   bool is(const char* wanted) const { return std::memcmp(name, wanted, 4) == 0; }
-  /// Whether a reader that does not know the chunk may not leave it out.
+  /// Whether a reader must know the chunk.
   bool critical() const { return (name[0] & 0x20) == 0; }
 };
 
@@ -48,7 +48,7 @@ class Chunks {
     png ? skip(kSignature.size()) : skip(left_);
   }
 
-  /// Nothing at the end of the file, or where it is broken.
+  /// None at the end of the file, or at a damaged chunk.
   std::optional<Chunk> next() {
     if (left_ < kChunkFrame) return std::nullopt;
     const std::size_t size = big_endian(at_);
@@ -95,7 +95,8 @@ bool inflate(const std::vector<std::uint8_t>& data, std::vector<std::uint8_t>& o
 // --------------------------
 
 /// Of left, above and above left the one that is next to left + above - above left, in this order
-/// of equals. No branches: what comes out is as good as random, and the next pixel waits for it.
+/// of equals. Without branches: their outcome would be unpredictable, and the next pixel depends on
+/// this one.
 inline int paeth(int left, int above, int corner) {
   const int to_left = std::abs(above - corner), to_above = std::abs(left - corner);
   const int to_corner = std::abs(above + left - 2 * corner);

@@ -62,7 +62,8 @@ void InertialFilter::predict(const std::vector<ImuSample>& samples, double scale
   covariance_.topLeftCorner<9, 9>() += transported(to_world, motion.covariance());
   covariance_.block<6, 6>(kGyro, kGyro) += motion.bias_walk_covariance();
   covariance_(kScale, kScale) += scale_walk * scale_walk * dt;
-  // The map turns under the camera, and what is fixed to the world turns in it: velocity, gravity.
+  // The map turns relative to the camera. Velocity and gravity are fixed to the world, so their
+  // coordinates in the map turn.
   Eigen::Matrix<double, 8, 3> turn;
   turn << R.transpose(), -skew(state_.velocity), Eigen::Matrix<double, 2, 3>::Identity();
   const Eigen::Matrix<double, 8, 8> walk =
@@ -153,7 +154,7 @@ double InertialFilter::distance(const Pose& T_cw, const Matrix6d& covariance) co
 
 void InertialFilter::move(const Pose& T_cw) {
   const Pose T_wb = T_cw.inverse() * T_cb_;
-  // Turns what is fixed to the map; the body stays as it is.
+  // Turns the quantities that are fixed to the map; those of the body do not change.
   const Eigen::Quaterniond turn =
       (T_wb.rotation() * state_.T_wb.rotation().conjugate()).normalized();
   const Eigen::Matrix3d R = turn.toRotationMatrix();

@@ -13,9 +13,8 @@ struct PoseGaussian {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// Gaussian over the state of the IMU in a map, from image to image: an error-state Kalman filter
-/// whose prediction is preintegration. What is marginalised from one image to the next is in the
-/// covariance. See docs/method/inertial.md#filter.
+/// Error-state Kalman filter for the state of the IMU in a map. Between two images it predicts by
+/// preintegration; the pose of each image is a measurement. See docs/method/inertial.md#filter.
 ///
 /// Errors are ordered (rotation, velocity, position, gyro bias, accelerometer bias, tilt of
 /// gravity, logarithm of the scale). That of the rotation acts on the right, velocity and position
@@ -48,19 +47,20 @@ class InertialFilter {
   /// The pose of the camera.
   PoseGaussian pose() const;
 
-  /// Takes the pose of an image that was estimated with pose() as prior, and its covariance. What
-  /// the image tells is counted `1 / inflation` times: errors of map points are common to
-  /// neighbouring images.
+  /// Updates by the pose of an image that was estimated with pose() as prior, and by its
+  /// covariance. The information of the image is divided by `inflation`, because neighbouring
+  /// images share errors of map points.
   void fuse(const Pose& T_cw, const Matrix6d& covariance, double inflation = 1);
-  /// Takes the pose of an image that was estimated without a prior.
+  /// Updates by the pose of an image that was estimated without a prior.
   void update(const Pose& T_cw, const Matrix6d& covariance);
   /// Squared Mahalanobis distance of a pose with this covariance from pose(): 6 degrees of freedom.
   double distance(const Pose& T_cw, const Matrix6d& covariance) const;
 
-  /// The map was moved: the camera's pose is this one now, and velocity and errors turn with it.
+  /// Follows a motion of the map: the camera now has this pose, and velocity and errors turn with
+  /// it.
   void move(const Pose& T_cw);
-  /// The map continues from the present pose, which has no error there by definition. What is known
-  /// of its error passes to velocity and gravity, whose axes are those of the body.
+  /// The map continues from the present pose, which has no error there by definition. The
+  /// covariance of its error passes to velocity and gravity, in the axes of the body.
   void anchor();
   /// The map was turned and scaled: `x' = factor * (rotation x) + shift`. The tilt and scale that
   /// it corrects are taken from the means: both are 0 afterwards, their deviations stay.

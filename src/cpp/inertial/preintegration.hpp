@@ -56,7 +56,7 @@ struct ImuState {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the body in the world [m/s]
 };
 
-/// What was odd about the samples of a preintegration.
+/// Irregularities of the samples of a preintegration: gaps and saturation.
 struct ImuFlags {
   int n_gaps = 0;             ///< intervals longer than PreintegrationOptions::max_gap
   double longest_gap = 0;     ///< seconds; 0 if there is no gap

@@ -8,7 +8,7 @@
 namespace orbslam {
 namespace {
 
-/// What the graph needs to know of the map.
+/// Data of the map that the graph needs.
 struct GraphSource {
   std::vector<Pose> T_cw;  // per vertex
   using Pairs = std::vector<std::pair<KeyFrameId, KeyFrameId>>;
@@ -34,7 +34,7 @@ GraphSource copy_source(const Map& map, LoopCorrection& correction, const Member
     for (const KeyFrameId other : keyframe.loop_edges) {
       if (other < id) source.loops.emplace_back(id, other);
     }
-    if (members.count(id) > 0) return;  // weights with the fusions are known better
+    if (members.count(id) > 0) return;  // their weights come with the fusions
     for (const auto& [other, weight] : keyframe.weights) {
       if (!(other < id)) break;
       if (weight >= Map::kEssentialWeight && members.count(other) == 0) {
@@ -51,7 +51,7 @@ void add_covisible_of_group(const CorrectedGroup& group, const Members& members,
     const KeyFrameId id = group.keyframes[k];
     for (const auto& [other, weight] : group.shared[k]) {
       if (weight < Map::kEssentialWeight) continue;
-      if (other > id && members.count(other) > 0) continue;  // will be seen from there
+      if (other > id && members.count(other) > 0) continue;  // the other end adds it
       covisible.emplace_back(std::max(id, other), std::min(id, other));
     }
   }
@@ -62,8 +62,8 @@ class EdgeWriter {
   EdgeWriter(const std::vector<KeyFrameId>& keyframes, PoseGraph& graph)
       : keyframes_(keyframes), graph_(graph) {}
 
-  /// `poses`: of the vertices, with which the edge agrees. Nothing is added for a pair that has an
-  /// edge, or when one of them is no vertex.
+  /// Adds an edge whose measurement is the relative pose in `poses` (poses of the vertices). Adds
+  /// nothing if the pair already has an edge, or if one of them is no vertex.
   void add(KeyFrameId a, KeyFrameId b, const std::vector<Similarity>& poses) {
     const std::ptrdiff_t at_a = vertex_of(keyframes_, a), at_b = vertex_of(keyframes_, b);
     if (at_a < 0 || at_b < 0 || a == b) return;

@@ -22,14 +22,14 @@ struct CorrectedGroup {
 
 /// Vertices, measurements and fixed vertex of a correction (Mur-Artal et al. 2015, section VII-D).
 /// Vertices are all published keyframes of the map, those of the group at their corrected places.
-/// Edges are the loop and its strong new links, as the corrected group says that they are; then the
-/// spanning tree, earlier loops and strong covisibility, as the map says. Strong are
-/// Map::kEssentialWeight shared points. One edge per pair, the first of these. The far end of the
-/// loop is fixed. Leaves the graph empty when an end of the loop is dead or unpublished. Takes the
-/// read lock. See docs/method/loops.md#essential-graph.
+/// Edges of the loop and its strong new links take their relative poses from the corrected group.
+/// Edges of the spanning tree, of earlier loops and of strong covisibility take them from the map.
+/// Covisibility is strong from Map::kEssentialWeight shared points on. A pair has one edge, the
+/// first of these. The far end of the loop is fixed. Leaves the graph empty when an end of the loop
+/// is dead or unpublished. Takes the read lock. See docs/method/loops.md#essential-graph.
 void build_essential_graph(const Map& map, const CorrectedGroup& group, LoopCorrection& correction);
 
-/// Where an id is among ascending ones, or -1.
+/// Index of an id among ascending ids, or -1.
 std::ptrdiff_t vertex_of(const std::vector<KeyFrameId>& keyframes, KeyFrameId id);
 /// The keyframe itself or the last one before it; the first one when there is none. The ids must
 /// not be empty.

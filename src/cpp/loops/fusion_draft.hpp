@@ -16,12 +16,11 @@ namespace orbslam {
 /// Keyframes with which a keyframe shares points, and how many; ascending ids.
 using SharedPoints = std::vector<std::pair<KeyFrameId, int>>;
 
-/// The neighbours that shared points make: KeyFrame::neighbours, had it just been brought up to
-/// date.
+/// Neighbours by shared points: the up-to-date value of KeyFrame::neighbours.
 std::vector<KeyFrameId> neighbours_by(const SharedPoints& shared);
 
-/// The slots of a group of keyframes, the points in them and the points on the far side of a loop,
-/// copied, so that fusions are tried out one after the other while the map stays as it is. See
+/// Copies of the slots of a group of keyframes, of their points, and of the points on the far side
+/// of a loop. Fusions are tried out on these copies; the map does not change. See
 /// docs/method/loops.md#fusion-across-the-loop.
 class FusionDraft {
  public:
@@ -31,7 +30,7 @@ class FusionDraft {
 
   const Frame& frame(std::size_t k) const { return *keyframes_[k].frame; }
   const Pose& T_cw(std::size_t k) const { return keyframes_[k].T_cw; }
-  /// The points on the far side as they were copied.
+  /// The copied points of the far side.
   const PointBatch& far_points() const { return far_points_; }
 
   /// Keypoint `keypoint` of the k-th keyframe shows a point of the far side: the point is added to
@@ -81,8 +80,8 @@ class FusionDraft {
   std::vector<LoopCorrection::Fusion> fusions_;
 };
 
-/// Carries out the fusions [first, last) of those that were drafted before; what has died meanwhile
-/// is left out. Returns the number of changes. Points that gained an observation are appended to
+/// Carries out the drafted fusions [first, last); keyframes and points that have died since are
+/// skipped. Returns the number of changes. Points that gained an observation are appended to
 /// `added`. The caller holds the write lock.
 int carry_out(const std::vector<LoopCorrection::Fusion>& fusions, std::size_t first,
               std::size_t last, Map& map, std::vector<MapPointId>& added);

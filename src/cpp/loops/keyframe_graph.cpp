@@ -18,7 +18,7 @@ double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
 
 }  // namespace
 
-/// What a search knows of a node.
+/// State of a node during a search.
 struct KeyFrameGraph::Reached {
   double cost = std::numeric_limits<double>::infinity();
   double length = 0, turned = 0;

@@ -18,9 +18,9 @@ struct KeyFrameWay {
   bool exists() const { return length < std::numeric_limits<double>::infinity(); }
 };
 
-/// Which keyframes have a measured relative pose, and where they are: a copy of the map's
-/// covisibility graph (KeyFrame::neighbours), spanning tree and loop edges, for searches without
-/// a lock. See docs/method/loops.md#choice.
+/// Graph of keyframes with measured relative poses, for searches without a lock. It is a copy of
+/// poses, covisibility graph (KeyFrame::neighbours), spanning tree and loop edges of the map. See
+/// docs/method/loops.md#choice.
 class KeyFrameGraph {
  public:
   /// The caller holds a lock.
@@ -28,7 +28,7 @@ class KeyFrameGraph {
 
   /// From `from` to each of `to`, in their order. The shortest way has the least sum of metres and
   /// `metres_per_radian` times radians (Dijkstra 1959; ties: by the keyframe with the lower id).
-  /// No way leads to or from a keyframe that was dead.
+  /// A keyframe that was dead at the time of the copy has no paths.
   std::vector<KeyFrameWay> shortest_ways(KeyFrameId from, const std::vector<KeyFrameId>& to,
                                          double metres_per_radian) const;
 

@@ -8,8 +8,8 @@
 
 namespace orbslam {
 
-/// A place seen again: the present keyframe, the one that showed the place before, and the
-/// similarity between their cameras, with which the drift gathered meanwhile can be taken out. See
+/// A place seen again: the present keyframe, the earlier keyframe of that place, and the similarity
+/// between their cameras. The similarity measures the drift since then. See
 /// docs/method/loops.md#verification.
 struct Loop {
   KeyFrameId current, matched;

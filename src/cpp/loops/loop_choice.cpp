@@ -12,12 +12,12 @@
 namespace orbslam {
 namespace {
 
-// Stereo systems drift by less than 2 % of the way, those with a single camera by up to 10 %, most
-// of which is drift of scale, which the loop itself measures.
+// Stereo systems drift by less than 2 % of the path, single cameras by up to 10 %. Most of the
+// latter is drift of scale, which the loop itself measures.
 constexpr double kDriftOfPath = 0.04;  // metres per metre
 constexpr double kDriftOfTurn = 0.02;  // scene depths per radian
 constexpr double kMeasuring = 0.1;     // scene depths, by which a loop's own measurement may err
-constexpr double kHiddenScale = 0.05;  // log of a scale that came and went
+constexpr double kHiddenScale = 0.05;  // log of a scale drift that was undone later
 constexpr double kRotation = 0.1;      // radians, drift over a short way and measurement
 constexpr double kRotationOfTurn = 0.03;
 constexpr double kRotationOfPath = 0.01;             // radians per scene depth
@@ -25,7 +25,7 @@ constexpr double kMaxRotation = 1.0471975511965976;  // 60 degrees
 constexpr double kScaleDrift = 1.5;                  // over a short way
 const double kLogScale = std::log(kScaleDrift);
 constexpr double kLogScaleOfPath = 0.01;  // per scene depth
-/// The difference of two measurements errs by the root of 2 times as much as one; rounded up.
+/// The error of a difference of two measurements is sqrt(2) times that of one; rounded up.
 constexpr double kTwoMeasurements = 1.5;
 constexpr double kRounding = 1e-9;
 
@@ -45,8 +45,8 @@ struct Limits {
   double translation = 0, rotation = 0, log_scale = 0;
 };
 
-/// What drift along a way explains when it has changed the scale by exp(log_scale) in the end.
-/// `measuring` multiplies the error of the measurement.
+/// Largest differences that drift along a path explains, if the scale has changed by
+/// exp(log_scale). `measuring` multiplies the error of the measurement.
 Limits limits_of(const KeyFrameWay& way, double scene_depth, double log_scale, bool fix_scale,
                  double measuring = 1) {
   Limits limits;
@@ -66,7 +66,7 @@ Limits limits_of(const KeyFrameWay& way, double scene_depth, double log_scale, b
 struct Surroundings {
   Surroundings(const Map& map, KeyFrameId current) : Surroundings(map, current, map.read_lock()) {}
 
-  /// Turning by an angle costs as many metres as drift makes of it.
+  /// A rotation counts as the number of metres that its drift corresponds to.
   std::vector<KeyFrameWay> ways(KeyFrameId from, const std::vector<KeyFrameId>& to) const {
     return graph.shortest_ways(from, to, scene_depth * kDriftOfTurn / kDriftOfPath);
   }
@@ -105,7 +105,7 @@ LoopDrift assess(const Surroundings& around, const Loop& loop, const KeyFrameWay
   return drift;
 }
 
-/// Where two measurements put one camera, one against the other.
+/// Difference between two measured poses of one camera.
 struct Difference {
   Difference(const Pose& a, const Pose& b)
       : translation((a.center() - b.center()).norm()), rotation(angle_between(a, b)) {}
@@ -117,8 +117,8 @@ struct Difference {
   }
 };
 
-/// Most measurements agree closely; only for the others it matters how far apart their far ends
-/// are.
+/// Most measurements agree closely. The distance between the far ends is only needed for the
+/// others.
 KeyFrameWay nowhere() {
   KeyFrameWay way;
   way.length = 0;
@@ -186,7 +186,7 @@ std::optional<Loop> choose_merge(const Map& map, const std::vector<Loop>& loops,
       if (map.map_of(loop.matched) != other) return std::nullopt;
     }
   }
-  // Places and lengths are those of the other map.
+  // Positions and lengths are in the other map.
   const Surroundings around(map, loops.front().matched);
   for (std::size_t i = 0; i < loops.size(); ++i) {
     for (std::size_t j = i + 1; j < loops.size(); ++j) {

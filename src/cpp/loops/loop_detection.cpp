@@ -46,7 +46,7 @@ std::vector<KeyFrameId> LoopConsistency::update(const Map& map,
       begins = false;
       const int confirmations = groups_[g].confirmations + 1;
       accepted = accepted || confirmations >= kNeeded;
-      // A chain goes on once; a second candidate may still profit from it.
+      // A chain is continued once, but a second candidate may also use its length.
       if (continued[g]) continue;
       continued[g] = 1;
       groups.push_back({members, confirmations});

@@ -7,9 +7,9 @@
 
 namespace orbslam {
 
-/// A loop is believed only when the same part of the map is proposed by consecutive keyframes
-/// (Mur-Artal et al. 2015, section VII-A). Remembers what the keyframe before proposed. One thread.
-/// See docs/method/loops.md#consistency.
+/// A loop is accepted only if consecutive keyframes propose the same part of the map (Mur-Artal et
+/// al. 2015, section VII-A). The object remembers the proposals of the keyframe before. For one
+/// thread. See docs/method/loops.md#consistency.
 class LoopConsistency {
  public:
   static constexpr int kNeeded = 3;  ///< consecutive confirmations
@@ -18,8 +18,8 @@ class LoopConsistency {
   /// whose part of the map (they and their covisible keyframes) has been proposed by kNeeded
   /// keyframes before this one, in the given order. Parts proposed by successive keyframes are
   /// the same when they share a keyframe; the first candidate to meet a part of the keyframe
-  /// before carries its chain on. Dead candidates count for nothing. Takes the map's read lock
-  /// while it copies.
+  /// before carries its chain on. Dead candidates are ignored. Takes the map's read lock while it
+  /// copies.
   std::vector<KeyFrameId> update(const Map& map, const std::vector<KeyFrameId>& candidates);
 
   /// After a correction, a gap or a reset.

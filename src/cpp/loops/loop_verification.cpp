@@ -18,14 +18,14 @@ namespace orbslam {
 namespace {
 
 constexpr float kWordRatio = 0.75F;
-/// Where a picture repeats itself RANSAC may find one wrong similarity after the other. Each costs
-/// a guided search, hundreds would cost seconds.
+/// In a repetitive image RANSAC may find many wrong similarities. Each costs a guided search;
+/// hundreds would take seconds.
 constexpr int kMaxRefinements = 10;
 
 /// The far side's point per keypoint of `current`, or an invalid id.
 using MatchedPoints = std::vector<MapPointId>;
 
-/// What both keyframes know about the matched points, copied under one lock.
+/// The data of both keyframes about the matched points, copied under one lock.
 struct Correspondences {
   std::vector<std::uint32_t> keypoints;  ///< of `current`, ascending
   std::vector<SimilarityMatch> matches;  ///< 1: current, 2: candidate
@@ -55,7 +55,7 @@ std::optional<SimilarityMatch> correspondence(const Map& map, const KeyFrame& cu
   return match;
 }
 
-/// A keypoint of `current` and the far side's point alone, whatever keyframe there observes it.
+/// A keypoint of `current` and a point of the far side, observed by any keyframe there.
 std::optional<SimilarityMatch> sighting(const Map& map, const KeyFrame& current,
                                         const KeyFrame& candidate, std::size_t keypoint,
                                         MapPointId partner) {
@@ -72,8 +72,8 @@ std::optional<SimilarityMatch> sighting(const Map& map, const KeyFrame& current,
 
 enum class Gathered { kMutual, kAll };
 
-/// Nothing when a keyframe is dead. Matches that lack a point on either side are deleted, unless
-/// all are gathered: alone nothing could say whether they are right.
+/// None when a keyframe is dead. Matches that lack a point on either side are deleted, unless all
+/// are gathered: alone they cannot be verified.
 std::optional<Correspondences> gather(const Map& map, KeyFrameId current, KeyFrameId candidate,
                                       MatchedPoints& matched, Gathered which = Gathered::kMutual) {
   const auto lock = map.read_lock();
@@ -151,7 +151,7 @@ std::vector<MapPointId> points_around(const Map& map, KeyFrameId candidate) {
   return points;
 }
 
-/// The verification of one candidate: what does not change between its steps.
+/// The constant data of the verification of one candidate.
 class Verification {
  public:
   Verification(const Map& map, KeyFrameId current, KeyFrameId candidate,
@@ -221,8 +221,8 @@ class Verification {
         loop.matches.begin(), loop.matches.end(), [](MapPointId point) { return point.valid(); }));
   }
 
-  /// Once more with all matches: the points of the neighbours lie around the few that the two
-  /// keyframes share, and hold the similarity where these leave it loose.
+  /// Refines once more with all matches. The points of the neighbours surround the few that the two
+  /// keyframes share, and determine the similarity better.
   void settle(Loop& loop) const {
     const auto gathered = gather(map_, current_, candidate_, loop.matches, Gathered::kAll);
     if (!gathered) return;
@@ -243,7 +243,7 @@ class Verification {
                                options);
   }
 
-  /// Inliers that both keyframes have a point for: these alone tell the scale.
+  /// Inliers with a point in both keyframes: only these determine the scale.
   static int count_mutual(const SimilarityEstimate& estimate, const Correspondences& gathered) {
     int n = 0;
     for (std::size_t k = 0; k < gathered.matches.size(); ++k) {

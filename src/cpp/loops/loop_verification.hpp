@@ -19,11 +19,11 @@ struct LoopVerificationOptions {
 
 /// Geometric verification of one candidate (Mur-Artal et al. 2015, section VII-B): matches by
 /// words, similarity by RANSAC, guided matching both ways, refinement, projection of the points
-/// that the candidate and its neighbours observe. A similarity whose refinement keeps too little
-/// sends RANSAC on, until its iterations are spent or a few have failed. Nothing when one of the
-/// two is dead, both are the same or a step finds too little. Takes the map's read lock in short
-/// sections, between which others may change the map but not clear it; the map is not changed. See
-/// docs/method/loops.md#verification.
+/// that the candidate and its neighbours observe. If the refinement of a similarity keeps too few
+/// inliers, RANSAC continues, until its iterations are used up or a few similarities have failed.
+/// None when one of the two is dead, both are the same or a step finds too few matches. Takes the
+/// map's read lock in short sections, between which others may change the map but not clear it; the
+/// map is not changed. See docs/method/loops.md#verification.
 std::optional<Loop> verify_loop_candidate(const Map& map, KeyFrameId current, KeyFrameId candidate,
                                           const LoopVerificationOptions& options);
 

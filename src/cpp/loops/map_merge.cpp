@@ -19,8 +19,7 @@ bool can_be_joined(const Map& map, const MapMerge& merge) {
   return std::minmax(current->map, matched->map) == std::minmax(merge.kept, merge.moved);
 }
 
-/// A whole map moved by one similarity: what is worked out under a read lock, and what is left for
-/// the write section.
+/// Moves a whole map by one similarity: prepared under a read lock, written in a write section.
 class MovedMap {
  public:
   /// Takes the read lock, for a short while at a time.
@@ -78,8 +77,8 @@ void join(Map& map, const MapMerge& merge) {
   map.join_maps(current_moves ? current : matched, current_moves ? matched : current);
 }
 
-/// Calls visit(first, last) for short runs of `count` elements, each in a write section of its own:
-/// who reads the map meanwhile waits for one of them at most. Ends early when the map was cleared.
+/// Calls visit(first, last) for short runs of `count` elements. Each run has its own write section,
+/// so a reader waits for one run at most. Ends early when the map was cleared.
 template <typename Visit>
 void in_short_sections(Map& map, std::uint64_t epoch, std::size_t count, std::size_t length,
                        Visit&& visit) {
@@ -90,7 +89,7 @@ void in_short_sections(Map& map, std::uint64_t epoch, std::size_t count, std::si
   }
 }
 
-/// What both sides share becomes one, and is known to both. The number of fused points.
+/// Fuses the points that both sides share. Returns the number of fused points.
 int fuse_seam(Map& map, const MapMerge& merge) {
   constexpr std::size_t kPoints = 256, kKeyframes = 4;
   int n_fused = 0;

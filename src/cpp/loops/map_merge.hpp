@@ -11,12 +11,12 @@
 
 namespace orbslam {
 
-/// What joining two maps does to them, worked out on copies. The younger one is moved into the
-/// world of the older one, whose frame and scale stay; one that is not upright into that of one
-/// that is. Two upright maps keep roll and pitch (upright_correction()). See
+/// The changes that merging makes to two maps, computed on copies. The younger map is moved into
+/// the world of the older one, whose frame and scale stay. If only one map is upright, the other
+/// one is moved into its world. Two upright maps keep roll and pitch (upright_correction()). See
 /// docs/method/several_maps.md#merging.
 ///
-/// The caller keeps local mapping still from plan_map_merge() to apply_map_merge().
+/// The caller pauses local mapping from plan_map_merge() to apply_map_merge().
 struct MapMerge {
   Loop loop;  ///< `current` and `matched` are of two maps
   std::uint64_t epoch = 0;
@@ -35,7 +35,7 @@ struct MapMergeResult {
   MapIndex kept = kNoMap, moved = kNoMap;
   int n_moved_keyframes = 0, n_moved_points = 0;
   int n_fused = 0;   ///< points replaced or added
-  double scale = 1;  ///< by which lengths of the moved map were multiplied
+  double scale = 1;  ///< factor of lengths in the moved map
 };
 
 /// Moves one map into the other's world and makes them one map and one spanning tree with a loop
@@ -47,7 +47,7 @@ MapMergeResult apply_map_merge(Map& map, const MapMerge& merge);
 /// neighbours, ascending. Takes the read lock.
 std::vector<KeyFrameId> keyframes_of_seam(const Map& map, KeyFrameId current);
 
-/// Where every keyframe of a map is.
+/// The poses of all keyframes of a map.
 struct KeyFramePoses {
   std::vector<KeyFrameId> ids;  ///< ascending
   std::vector<Pose> T_cw;
@@ -55,10 +55,10 @@ struct KeyFramePoses {
 /// Published keyframes. Takes the read lock.
 KeyFramePoses poses_of_map(const Map& map, MapIndex which);
 
-/// Spreads what an adjustment of the seam has moved over the rest of the map: a pose graph with the
-/// relative poses of `before`, in which the seam stays where it is now. Points move with their
-/// reference keyframes, those of the seam stay. Returns whether anything was moved. Takes the map's
-/// locks in short sections. See docs/method/several_maps.md#the-seam.
+/// Spreads the motion of an adjusted seam over the rest of the map. It solves a pose graph with the
+/// relative poses of `before` and fixed poses of the seam. Points move with their reference
+/// keyframes, those of the seam stay. Returns whether anything was moved. Takes the map's locks in
+/// short sections. See docs/method/several_maps.md#the-seam.
 bool spread_from_seam(Map& map, const KeyFramePoses& before, const std::vector<KeyFrameId>& seam,
                       bool fix_scale, const std::atomic<bool>* abort);
 

@@ -8,9 +8,8 @@
 
 namespace orbslam {
 
-/// The two halves of apply_loop_correction(): what is worked out under a read lock, and what is
-/// left for the write section. Refers to the correction, which must outlive it. See
-/// docs/method/loops.md#correction.
+/// The two halves of apply_loop_correction(): the preparation under a read lock, and the write
+/// section. Refers to the correction, which must outlive it. See docs/method/loops.md#correction.
 class PreparedCorrection {
  public:
   /// Takes the read lock, for a short while at a time.

@@ -10,7 +10,7 @@
 
 namespace orbslam {
 
-/// Both sides of a place seen again, and what they have in common, worked out on copies.
+/// Both sides of a place seen again, and their common points, computed on copies.
 struct Seam {
   std::uint64_t epoch = 0;
   MapIndex near_map = kNoMap, far_map = kNoMap;  ///< of `current` and of `matched`
@@ -18,9 +18,9 @@ struct Seam {
   FusionDraft draft;     ///< with all fusions
 };
 
-/// Carries the similarity of a loop to the neighbours of `current`, along the relative poses within
-/// that group, and finds which points are the same on both sides: the loop's matches, and the far
-/// side's points projected into every keyframe of the group. Both sides may be of one map or of
+/// Propagates the similarity of a loop to the neighbours of `current`, along the relative poses
+/// within that group. Finds the points that are the same on both sides: the loop's matches, and the
+/// far side's points projected into every keyframe of the group. Both sides may be of one map or of
 /// two. Nothing when an end is dead or unpublished. Takes the map's read lock. Throws
 /// std::invalid_argument unless the loop has one match, or an invalid id, per keypoint of its
 /// current keyframe. See docs/method/loops.md#fusion-across-the-loop.

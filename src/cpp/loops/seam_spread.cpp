@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an adjustment of the seam of two maps has moved, spread over the rest.
+// Spreads the motion of an adjusted seam of two maps over the rest of the map.
 #include <algorithm>
 #include <atomic>
 #include <utility>
@@ -13,7 +13,7 @@
 namespace orbslam {
 namespace {
 
-/// Keyframes and what ties them, with the relative poses of an earlier moment.
+/// Keyframes and their edges, with relative poses from an earlier moment.
 struct SeamGraph {
   std::uint64_t epoch = 0, big_changes = 0;
   std::vector<KeyFrameId> ids;          // ascending, living ones
@@ -67,7 +67,7 @@ SeamGraph gather_seam(const Map& map, const KeyFramePoses& poses,
   return seam;
 }
 
-/// Whether some keyframe of the seam sees the point: the seam's adjustment has moved it already.
+/// Whether a keyframe of the seam observes the point, so that the adjustment has moved it already.
 bool is_seen_from_seam(const MapPoint& point, const SeamGraph& seam) {
   return std::any_of(point.observations.begin(), point.observations.end(), [&](const auto& seen) {
     const std::ptrdiff_t at = vertex_of(seam.ids, seen.keyframe);
@@ -75,13 +75,13 @@ bool is_seen_from_seam(const MapPoint& point, const SeamGraph& seam) {
   });
 }
 
-/// Up to which keyframe and point a map has been looked at; of an empty one the ids are invalid.
+/// The last keyframe and point of a map that were processed; invalid ids for an empty map.
 struct LookedAt {
   KeyFrameId keyframe;
   MapPointId point;
 };
 
-/// Where all keyframes and points go that are younger than those looked at before.
+/// New places of the keyframes and points that are younger than those processed before.
 MapRewrite rewrite_of(const Map& map, const SeamGraph& seam, LookedAt& looked_at) {
   const LookedAt before = looked_at;
   std::vector<Similarity> world;  // per vertex: from the world before to the one after

@@ -7,7 +7,7 @@
 
 namespace orbslam {
 
-/// A moment in the life of a map, by its changes.
+/// A state of a map, identified by the number of its last change.
 struct MapStamp {
   std::uint64_t epoch = 0, keyframes = 0, points = 0;
 
@@ -16,19 +16,19 @@ struct MapStamp {
   }
 };
 
-/// Ids, ascending, of what has changed. Those removed may also name objects that came and went
-/// meanwhile, and ids that have not been given yet.
+/// Ascending ids of changed objects. The removed ids may include objects that were created and
+/// removed in between, and ids that are not used yet.
 struct ChangedIds {
   MapStamp stamp;          ///< of the moment of the answer
-  bool restarted = false;  ///< the map was cleared since; all that lives is listed
+  bool restarted = false;  ///< the map was cleared since; all living objects are listed
   std::vector<KeyFrameId> keyframes, keyframes_removed;
   std::vector<MapPointId> points, points_removed;
 };
 
-/// The present moment. Takes the read lock.
+/// The present state. Takes the read lock.
 MapStamp stamp_of(const Map& map);
-/// What has changed since; everything since MapStamp(). Keyframes that are not published count, the
-/// tracker's counters do not. Takes the read lock. See docs/method/map.md#changes.
+/// The objects that have changed since; all objects for a default MapStamp(). Unpublished keyframes
+/// count, the tracker's counters do not. Takes the read lock. See docs/method/map.md#changes.
 ChangedIds changed_since(const Map& map, const MapStamp& since);
 
 }  // namespace orbslam

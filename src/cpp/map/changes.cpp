@@ -17,7 +17,7 @@ constexpr int kPageCost = 8;
 /// After so many sections the next ones get more.
 constexpr int kPatience = 256;
 
-/// Ids given in several sections: the last state of each counts.
+/// An id may be reported in several sections; its last state counts.
 template <class IdType>
 std::vector<std::size_t> last_of_each(const std::vector<IdType>& ids) {
   std::vector<std::size_t> rows(ids.size());
@@ -52,7 +52,7 @@ void drop(std::vector<std::size_t>& rows, const std::vector<IdType>& ids,
              rows.end());
 }
 
-/// Those of the dead that had been told of before this look.
+/// Dead objects that had been reported before this look.
 template <class IdType>
 std::vector<IdType> removed(const std::vector<IdType>& dead, const std::vector<IdType>& born) {
   std::vector<IdType> ids;
@@ -74,10 +74,10 @@ void tell_if_changed(KeyFramePairs&& now, KeyFramePairs& before, bool always,
 
 }  // namespace
 
-/// A look that may take several sections under the lock.
+/// One look, which may take several sections under the lock.
 struct MapFollower::Pending {
   MapChanges changes;
-  // Told of for the first time in this look; told of before or in this look, and dead since.
+  // Objects reported for the first time in this look, and reported objects that have died since.
   std::vector<KeyFrameId> keyframes_born, keyframes_dead;
   std::vector<MapPointId> points_born, points_dead;
 
@@ -114,9 +114,9 @@ MapChanges MapFollower::update() {
   const std::lock_guard<std::mutex> one_at_a_time(mutex_);
   Pending pending;
   if (!complete_) restart(pending);
-  complete_ = false;  // should memory run out on the way, the next look begins anew
+  complete_ = false;  // if memory runs out, the next look starts again
   int n_sections = 1;
-  // Should writers be faster, sections grow.
+  // If writers are faster, sections grow.
   while (!look(pending, kBudget * (1 + n_sections / kPatience))) ++n_sections;
   if (n_sections == 1) {
     pending.changes.keyframes_removed = std::move(pending.keyframes_dead);
@@ -139,7 +139,8 @@ void MapFollower::restart(Pending& pending) {
   pending.changes.restarted = true;
 }
 
-/// One section. Tells whether all has been seen, so that what was told is the map of this moment.
+/// Reads one section. Returns true when all objects have been read, so that the report agrees with
+/// the present map.
 bool MapFollower::look(Pending& pending, int budget) {
   const auto lock = map_->read_lock();
   const MapIndex wanted = which_ == kNoMap ? map_->active_map() : which_;

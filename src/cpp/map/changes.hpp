@@ -15,44 +15,44 @@ namespace orbslam {
 using KeyFramePair = std::array<KeyFrameId, 2>;
 using KeyFramePairs = std::vector<KeyFramePair>;
 
-/// What turns the map as it was at the last look into the map of one later moment: forget
-/// everything if `restarted`, drop what was removed, take over what is set. Ids ascend. What is set
-/// may also be as it was before.
+/// The changes from the map of the last look to a later state of the map. A follower forgets
+/// everything if `restarted`, drops the removed objects, and takes over the given ones. Ids ascend.
+/// A given object may also be unchanged.
 struct MapChanges {
   MapIndex map = 0;        ///< which one it is
-  bool restarted = false;  ///< the first look, or another map than before, whose ids may begin anew
+  bool restarted = false;  ///< the first look, or another map, whose ids may start again
   KeyFrameSnapshot keyframes_set;
   std::vector<KeyFrameId> keyframes_removed;  ///< of those given before
   PointSnapshot points_set;
   std::vector<MapPointId> points_removed;  ///< of those given before
-  // All pairs of published keyframes, ascending, if they are not as before.
+  // All pairs of published keyframes, ascending; none if they have not changed.
   std::optional<KeyFramePairs> covisibility;   ///< the lower id first
   std::optional<KeyFramePairs> loop_edges;     ///< the lower id first
   std::optional<KeyFramePairs> spanning_tree;  ///< keyframe and its parent
 };
 
-/// Tells at every look what has changed in a map since the look before, and looks at that only.
-/// Where much has changed it gives the read lock back every few thousand objects, so that no writer
-/// waits for long, and looks again at what was changed meanwhile: what it tells is the map of one
-/// moment. May be used from any thread. See docs/method/map.md#changes.
+/// Reports at every look the changes of a map since the look before, and reads only those. After
+/// many changes it releases the read lock every few thousand objects, so that no writer waits for
+/// long. It then reads objects again that were changed in between, so the report agrees with one
+/// state of the map. May be used from any thread. See docs/method/map.md#changes.
 class MapFollower {
  public:
-  /// `least_weight`: shared points of two keyframes whose covisibility is told. `which`: the map
-  /// that is followed; kNoMap: the active one, whichever that is.
+  /// `least_weight`: least number of shared points of a reported covisibility edge. `which`: the
+  /// map that is followed; kNoMap: the map that is active at each look.
   explicit MapFollower(std::shared_ptr<const Map> map, int least_weight = Map::kEssentialWeight,
                        MapIndex which = kNoMap);
 
   MapChanges update();
 
  private:
-  /// What edges are made of, per published keyframe.
+  /// Edges of each published keyframe.
   struct Links {
     KeyFrameId parent;
     std::vector<KeyFrameId> strong, loops;  ///< with higher ids
   };
   struct Known {
-    std::vector<std::uint64_t> seen;  ///< per page: its stamp when it was looked at
-    std::vector<bool> told;           ///< per id: part of what was given
+    std::vector<std::uint64_t> seen;  ///< per page: its stamp when it was read
+    std::vector<bool> told;           ///< per id: was reported
   };
   struct Pending;
 
@@ -66,7 +66,7 @@ class MapFollower {
   int least_weight_;
   MapIndex which_;
   std::mutex mutex_;
-  bool complete_ = false;  ///< what was told is all that there was
+  bool complete_ = false;  ///< the last look was complete
   std::uint64_t epoch_ = 0;
   MapIndex followed_ = kNoMap;
   Known keyframes_, points_;

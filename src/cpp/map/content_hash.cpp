@@ -36,7 +36,7 @@ std::uint64_t content_hash(const Map& map) {
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
     hash.add(keyframe.id.value);
     hash.add(keyframe.parent.value);
-    // One map alone has the same hash whatever its number.
+    // A single map has the same hash for any number.
     if (first == kNoMap) first = keyframe.map;
     if (keyframe.map != first) hash.add(keyframe.map - first);
     const Eigen::Quaterniond& q = keyframe.T_cw.rotation();

@@ -109,7 +109,7 @@ void reserve(PointRows& rows, ObservationRows& observations, std::size_t n) {
   observations.keypoint.reserve(4 * n);
 }
 
-/// Notes the point, and tells whether all its observations are part of the contents.
+/// Records the point. Returns whether all its observations are part of the contents.
 bool copy_point(const Map& map, const MapPoint& point, MapContents& contents) {
   PointRows& rows = contents.points;
   ObservationRows& observations = contents.observations;

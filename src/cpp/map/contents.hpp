@@ -9,7 +9,7 @@
 
 namespace orbslam {
 
-/// A camera and the pyramid its images were searched with.
+/// A camera, and the image pyramid used with it.
 struct CameraContents {
   CameraOptions camera;
   float scale_factor = 0;
@@ -60,21 +60,22 @@ struct EdgeRows {
   std::vector<std::int32_t> weight;
 };
 
-/// Everything that a map is, of one moment, ordered by id. Keyframes that local mapping has not
-/// taken in yet are not part of it, nor what only they see. See docs/reference/map_file.md.
+/// The complete contents of a map at one moment, ordered by id. Keyframes that local mapping has
+/// not processed yet are left out, and so are points that only they observe. See
+/// docs/reference/map_file.md.
 struct MapContents {
   std::uint64_t epoch = 0;
   std::uint64_t keyframe_stamp = 0, point_stamp = 0;  ///< of the last changes (IdTable::stamp)
   std::vector<std::uint8_t> keyframe_changed;  ///< one a keyframe: later than the stamp given
   std::vector<std::int64_t> pages;             ///< of points (IdTable) that were looked at
-  /// Of these, the ones with observations left out, which may become part of it without a change
-  /// of the point.
+  /// Of these, the points with observations that were left out. Such an observation may enter the
+  /// contents without a change of the point.
   std::vector<std::int64_t> incomplete_pages;
   KeyFrameId next_keyframe;
   MapPointId next_point;
   std::vector<CameraContents> cameras;
   KeyFrameRows keyframes;
-  std::vector<std::shared_ptr<const Frame>> frames;  ///< one a keyframe: what they never change
+  std::vector<std::shared_ptr<const Frame>> frames;  ///< one per keyframe: the constant data
   RemovedKeyFrameRows removed_keyframes;
   PointRows points;
   ObservationRows observations;
@@ -82,7 +83,7 @@ struct MapContents {
   std::vector<std::array<KeyFrameId, 2>> loop_edges;
 };
 
-/// What somebody has already: as of the stamps of an earlier copy of the same map.
+/// The state of an earlier copy of the same map, by its stamps.
 struct ContentsKnown {
   std::uint64_t keyframe_stamp = 0, point_stamp = 0;
   std::vector<std::int64_t> incomplete_pages;

@@ -7,15 +7,15 @@
 
 namespace orbslam {
 
-/// Where a culled keyframe was relative to its parent in the spanning tree.
+/// Pose of a culled keyframe relative to its parent in the spanning tree.
 struct ArchivedPose {
   KeyFrameId id, parent;
   Pose T_kp;
   double scale = 1, parent_scale = 1;
 };
 
-/// What copying and restoring a map as a whole need beside its public methods. The caller holds
-/// the map's lock.
+/// Access for copying and restoring a whole map, beside its public methods. The caller holds the
+/// map's lock.
 class MapContentsAccess {
  public:
   static KeyFrameId next_keyframe(const Map& map) { return map.next_keyframe_; }
@@ -25,7 +25,7 @@ class MapContentsAccess {
   /// The same for one culled keyframe, relative to the root of its map.
   static ArchivedPose relative_to_root(const Map& map, KeyFrameId id);
 
-  // Filling an empty map. Nothing is checked: see check_stored_map().
+  // Fills an empty map. Nothing is checked: see check_stored_map().
   static void set_next_ids(Map& map, KeyFrameId keyframe, MapPointId point);
   /// A published keyframe; its observations come with the points.
   static KeyFrame& add(Map& map, std::unique_ptr<KeyFrame> keyframe);

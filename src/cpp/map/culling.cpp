@@ -90,7 +90,7 @@ std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_c
   }
   for (const KeyFrameId id : neighbours) {
     {
-      // Most are needed; finding that out must not keep readers waiting.
+      // Most keyframes are needed. The check runs under the read lock, so that readers do not wait.
       const auto lock = map.read_lock();
       const KeyFrame* neighbour = map.find(id);
       if (neighbour && map.is_root(*neighbour)) continue;

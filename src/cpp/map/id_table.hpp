@@ -15,8 +15,8 @@ namespace orbslam {
 /// once all their objects have died, so that memory follows the number of live objects. See
 /// docs/method/map.md#replaced-and-dead-points.
 ///
-/// Every change has a number, its stamp. The table remembers the last one of each object, the death
-/// included, and of each page, so that what has changed is found without looking at what has not.
+/// Every change has a number, its stamp. The table stores the last stamp of each object, its death
+/// included, and of each page. Changes are therefore found without a visit to unchanged objects.
 /// See docs/method/map.md#changes.
 template <class IdType, class Object>
 class IdTable {
@@ -37,7 +37,7 @@ class IdTable {
     if (page >= pages_.size()) pages_.resize(page + 1);
     if (!pages_[page].objects) {
       pages_[page].objects = std::make_unique<Objects>();
-      // Whoever lived here before died with the page at the latest.
+      // Earlier objects of this place died with the page at the latest.
       pages_[page].objects->stamps.fill(pages_[page].stamp);
     }
     auto& slot = pages_[page].objects->slots[static_cast<std::size_t>(id.value) % kPageSize];

@@ -59,7 +59,7 @@ class Checker {
             [&] { return name_of_map(map_.active_map()) + " is active and has no keyframes"; });
   }
 
-  /// The keyframe and whatever it is tied to are of one map, which has a root.
+  /// The keyframe and all its neighbours, tree and loop edges belong to one map, which has a root.
   void check_map(const KeyFrame& keyframe) {
     const KeyFrame* root = map_.find(map_.root(keyframe.map));
     require(root && root->map == keyframe.map, [&] {

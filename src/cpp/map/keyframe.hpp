@@ -13,8 +13,8 @@
 
 namespace orbslam {
 
-/// A frame that stays. `frame` never changes and may be read without a lock once the pointer has
-/// been copied; the rest belongs to the Map and is read and written under its lock. See
+/// A frame stored in the map. `frame` never changes and may be read without a lock once the pointer
+/// has been copied; the rest belongs to the Map and is read and written under its lock. See
 /// docs/method/map.md#keyframes.
 struct KeyFrame {
   KeyFrameId id;
@@ -27,7 +27,8 @@ struct KeyFrame {
   double scale = 1;
   std::vector<MapPointId> map_points;  ///< per keypoint: the observed point or an invalid id
 
-  /// Per keypoint what alignment found, or empty. An entry counts while its point is the slot's.
+  /// Per keypoint the result of alignment, or empty. An entry is valid while its point is in the
+  /// slot.
   std::vector<AlignedSighting> aligned;
 
   /// Number of shared points per neighbour, all neighbours, symmetric.
@@ -37,16 +38,16 @@ struct KeyFrame {
   std::vector<KeyFrameId> neighbours;
 
   KeyFrameId parent;                ///< spanning tree; invalid for roots and before publication
-  bool provisional_parent = false;  ///< there was no neighbour yet; the first one replaces it
+  bool provisional_parent = false;  ///< parent by order in time only; a covisible one replaces it
   std::set<KeyFrameId> children;
   std::set<KeyFrameId> loop_edges;
 
   bool published = false;  ///< part of the map's keyframe set
-  bool processed = false;  ///< local mapping has taken it in (process_new_keyframe)
+  bool processed = false;  ///< local mapping has processed it (process_new_keyframe)
   int leases = 0;          ///< while > 0 a death is deferred (loop closing works on it)
   bool to_be_erased = false;
 
-  /// Null where the keypoint says where the point is seen.
+  /// The aligned observation of a slot; null if the observation uses the keypoint's own pixel.
   const AlignedSighting* aligned_at(std::size_t index, MapPointId point) const {
     const bool is_aligned =
         !aligned.empty() && aligned[index].point == point && aligned[index].ok();
@@ -54,7 +55,7 @@ struct KeyFrame {
   }
 
   Eigen::Vector3d center() const { return T_cw.center(); }
-  /// Of the camera that shows a keypoint, in the world; differs from center() for a rig.
+  /// Centre (world) of the camera that a keypoint belongs to; differs from center() for a rig.
   Eigen::Vector3d center_of(std::size_t keypoint) const { return frame->center_of(keypoint, T_cw); }
 };
 

@@ -25,8 +25,8 @@ void create_depth_points(Map& map, KeyFrameId id, TrackedFrame& tracked, std::si
   }
 }
 
-/// Gives the observation of slot i to its point, or clears the slot. Tells whether the point was
-/// made together with the keyframe.
+/// Adds the observation of slot i to its point, or clears the slot. Returns whether the point was
+/// created together with the keyframe.
 bool settle_slot(Map& map, const KeyFrame& keyframe, std::size_t i) {
   const MapPointId noted = keyframe.map_points[i];
   if (!noted.valid()) return false;

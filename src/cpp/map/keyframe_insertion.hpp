@@ -12,10 +12,10 @@ namespace orbslam {
 /// adjustment decides about them) and, if `create_points` (sensors with depth), makes map points
 /// from the depths of keypoints that have none, among those of nearest_keypoints(): `n_minimum` or
 /// all close ones, whichever is more. The first keyframe takes all: pass SIZE_MAX. New points are
-/// associated with the tracked frame too. Temporary and dead points are dropped from it, replaced
-/// ones give way to their successors, it follows the map if that has moved as a whole since it was
-/// tracked, and it is anchored at the new keyframe. Takes the write lock. Not published:
-/// process_new_keyframe() does. Throws StateError when the frame has no pose. See
+/// associated with the tracked frame too. Temporary and dead points are dropped from the frame,
+/// replaced points are exchanged for their successors. If the whole map has moved since tracking,
+/// the frame follows it. It is then anchored at the new keyframe. Takes the write lock. Not
+/// published: process_new_keyframe() does. Throws StateError when the frame has no pose. See
 /// docs/method/tracking.md#new-keyframes.
 KeyFrameId insert_keyframe(Map& map, TrackedFrame& frame, bool create_points,
                            std::size_t n_minimum = kFewestDepthPoints);

@@ -133,7 +133,7 @@ void collect_points(const Map& map, const std::vector<KeyFrameId>& keyframes, Po
 LocalMap select_local_map(const Map& map, TrackedFrame& frame) {
   LocalMap local;
   const auto lock = map.read_lock();
-  // Predicted in a map that has moved since: from here on the frame is in the present one.
+  // The map has moved since the pose was predicted. From here on the pose is in the present map.
   if (frame.anchor.big_change != map.big_change_index()) move_with_anchor(map, frame);
   refresh_associations(map, frame);
   int most = 0;

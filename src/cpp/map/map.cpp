@@ -86,7 +86,7 @@ void Map::publish(KeyFrameId id) {
   ++structure_version_;
   if (published.parent.valid() || is_root(published)) return;
 
-  // The root never dies, so there is always somebody to hang under.
+  // The root never dies, so a living ancestor always exists.
   const KeyFrameId root_id = root(published.map);
   KeyFrameId before(id.value - 1);
   for (; before > root_id; --before.value) {

@@ -19,7 +19,7 @@
 
 namespace orbslam {
 
-/// Where a keyframe is, and KeyFrame::scale.
+/// Pose of a keyframe, and KeyFrame::scale.
 struct ScaledPose {
   Pose T_cw;
   double scale = 1;
@@ -63,7 +63,7 @@ class Map {
   /// nullptr when the object is dead or never existed.
   const KeyFrame* find(KeyFrameId id) const { return keyframes_.find(id); }
   const MapPoint* find(MapPointId id) const { return points_.find(id); }
-  /// Follows replacements to the living end; an invalid id when the point died.
+  /// The living successor of a replaced point; an invalid id when the point died.
   MapPointId resolve(MapPointId id) const;
 
   /// Published and unpublished keyframes, ascending.
@@ -80,17 +80,17 @@ class Map {
     points_.for_each(visit);
   }
 
-  /// What the last change of each object was, for those who follow the map (map/changes.hpp).
-  /// Changes of keyframes: birth, death, pose, scale, publication, processing, parent, loop edges
-  /// and weights. Of points: birth, death, position and what follows from it, descriptor and
-  /// observations; not the tracker's counters.
+  /// The objects, with the stamp of each one's last change for followers of the map
+  /// (map/changes.hpp). Changes of keyframes: birth, death, pose, scale, publication, processing,
+  /// parent, loop edges and weights. Changes of points: birth, death, position, direction and scale
+  /// range, descriptor and observations; not the tracker's counters.
   const IdTable<KeyFrameId, KeyFrame>& keyframe_table() const { return keyframes_; }
   const IdTable<MapPointId, MapPoint>& point_table() const { return points_; }
 
   // ---- several maps ----------------------------------------------------------------------------
   /// The one that new keyframes belong to. Needs no lock.
   MapIndex active_map() const { return active_map_.load(); }
-  /// Those that hold keyframes, ascending: the oldest first.
+  /// Maps with keyframes, ascending: the oldest first.
   std::vector<MapIndex> maps() const;
   /// The map of a keyframe, living or culled; kNoMap for an unknown one.
   MapIndex map_of(KeyFrameId id) const;
@@ -113,11 +113,11 @@ class Map {
   /// Throws StateError for a map without keyframes.
   void activate_map(MapIndex map);
   /// Drops a map with all that belongs to it; the youngest of the others becomes active if it was.
-  /// Returns its keyframes, for those who keep an index of keyframes.
+  /// Returns its keyframes, so that the owner of a keyframe index can erase them.
   std::vector<KeyFrameId> erase_map(MapIndex map);
-  /// Everything of one map belongs to another one from now on, whose world it is in already. Its
-  /// spanning tree hangs with `child` under `parent`. Throws StateError when these are not a living
-  /// keyframe of each.
+  /// Moves all objects of one map to another map. They are in the other map's world already. Their
+  /// spanning tree is attached with `child` under `parent`. Throws StateError when these are not a
+  /// living keyframe of each.
   void join_maps(KeyFrameId child, KeyFrameId parent);
 
   // ---- keyframes -------------------------------------------------------------------------------
@@ -127,7 +127,7 @@ class Map {
   /// Makes the keyframe part of the keyframe set (idempotent). A keyframe that has no parent yet
   /// hangs provisionally under the published keyframe before it, so that the tree spans its map.
   void publish(KeyFrameId id);
-  /// Notes that process_new_keyframe() is through with the keyframe.
+  /// Records that process_new_keyframe() has finished with the keyframe.
   void mark_processed(KeyFrameId id) { changing(id).processed = true; }
   /// Only for a keyframe not yet published: notes a match (or its absence, with an invalid id)
   /// whose observation process_new_keyframe() adds later. The slot must not hold an observation.
@@ -145,9 +145,9 @@ class Map {
 
   /// A counted protection against erase_keyframe(). Throws StateError for a dead keyframe.
   void begin_lease(KeyFrameId id);
-  /// The last one carries out a deferred death, unless a loop edge protects the keyframe by now;
-  /// the request is cleared either way. Ignored when clear() removed the keyframe meanwhile.
-  /// Returns whether the keyframe died: who keeps an index of keyframes erases it there.
+  /// The last release carries out a deferred death, unless a loop edge protects the keyframe now.
+  /// The request is cleared in both cases. Ignored when clear() removed the keyframe meanwhile.
+  /// Returns whether the keyframe died; the owner of a keyframe index then erases it there.
   bool end_lease(KeyFrameId id);
   /// Adds the edge on both keyframes; both are protected for ever.
   void add_loop_edge(KeyFrameId a, KeyFrameId b);
@@ -166,15 +166,15 @@ class Map {
   /// A new point without observations; the caller adds them, then calls update_point().
   MapPointId add_point(const Eigen::Vector3d& position, KeyFrameId reference, FrameId first_frame);
   void set_position(MapPointId id, const Eigen::Vector3d& position);
-  /// Position and what follows from it at once, worked out before by geometry_at().
+  /// Sets the position with the direction and scale range that geometry_at() has computed.
   void set_geometry(MapPointId id, const PointGeometry& geometry);
-  /// What would follow if the point were at `position` and the camera of its k-th observation at
-  /// centers[k].
+  /// Direction and scale range of the point if it were at `position` and the camera of its k-th
+  /// observation at centers[k].
   PointGeometry geometry_at(const MapPoint& point, const Eigen::Vector3d& position,
                             const std::vector<Eigen::Vector3d>& centers) const;
 
-  // The methods that create or move something throw StateError for a dead or unknown id, because
-  // the caller should have looked; those that remove, refresh or count ignore it.
+  // Methods that create or move an object throw StateError for a dead or unknown id, which is an
+  // error of the caller. Methods that remove, refresh or count ignore such an id.
 
   /// Both sides at once. Does nothing when the point is already observed in the keyframe or the
   /// slot holds another living point.
@@ -204,12 +204,12 @@ class Map {
   // ---- aligned sightings (docs/method/alignment.md) --------------------------------------------
   /// Sets or takes away (null) the reference sighting of a point; ignores a dead one.
   void set_patch(MapPointId id, std::shared_ptr<const PointPatch> patch);
-  /// Notes where a keyframe sees the point of a slot; ignores a dead keyframe and a slot that holds
-  /// another point by now.
+  /// Stores the aligned observation of a slot. Ignores a dead keyframe, and a slot that holds
+  /// another point now.
   void set_aligned(KeyFrameId id, std::size_t index, const AlignedSighting& sighting);
-  /// Forgets it. The keypoint counts again.
+  /// Removes it; the observation uses the keypoint's pixel again.
   void clear_aligned(KeyFrameId id, std::size_t index);
-  /// Standard deviations of aligned sightings over those that their patches give, as measured.
+  /// Measured ratio of the noise of aligned pixels to that of corners.
   NoiseFactors& noise() { return noise_; }
   const NoiseFactors& noise() const { return noise_; }
 
@@ -218,7 +218,7 @@ class Map {
   /// gives the keyframe its parent (the strongest neighbour that is not its descendant) the first
   /// time that it has neighbours.
   void update_connections(KeyFrameId id);
-  /// The first n of KeyFrame::neighbours; none of a keyframe that was culled, maybe just now.
+  /// The first n of KeyFrame::neighbours; none for a culled keyframe.
   std::vector<KeyFrameId> best_neighbours(KeyFrameId id, std::size_t n) const;
   int weight(KeyFrameId a, KeyFrameId b) const;
 
@@ -249,7 +249,7 @@ class Map {
 
   KeyFrame& keyframe(KeyFrameId id);
   MapPoint& point(MapPointId id);
-  // The same, to be changed in a way that followers are told of.
+  // The same for a change that followers must see.
   KeyFrame& changing(KeyFrameId id);
   MapPoint& changing(MapPointId id);
   const KeyFrame& keyframe(KeyFrameId id) const;
@@ -274,8 +274,8 @@ class Map {
   IdTable<KeyFrameId, KeyFrame> keyframes_;
   IdTable<MapPointId, MapPoint> points_;
   std::unordered_map<KeyFrameId, ArchivedKeyFrame> archive_;
-  /// Where replaced points went. Entries older than kReplacementMemory keyframes are forgotten:
-  /// whoever holds an id for longer finds it dead, which is safe.
+  /// Successors of replaced points. Entries older than kReplacementMemory keyframes are removed. An
+  /// id that is held for longer resolves to a dead point, which is safe.
   static constexpr std::int64_t kReplacementMemory = 50;
   std::unordered_map<MapPointId, MapPointId> replaced_by_;
   std::deque<std::pair<KeyFrameId, MapPointId>> replacements_;

@@ -55,7 +55,7 @@ void Map::update_connections(KeyFrameId id) {
     }
   }
 
-  // Neighbours that share nothing any more get the weight 0 along with the others.
+  // Neighbours that share no point any more get the weight 0.
   std::vector<KeyFrameId> others = shared.counted();
   for (const auto& [other, weight] : updated.weights) {
     if (shared.of(other) == 0) others.push_back(other);

@@ -26,7 +26,7 @@ MapIndex Map::map_of(MapPointId id) const {
 }
 
 bool Map::is_in(const MapPoint& point, MapIndex map) const {
-  // With one map, which is the rule, nothing has to be looked up.
+  // Usually there is one map, and no look-up is needed.
   if (parts_.size() == 1) return parts_.begin()->first == map;
   const KeyFrame* reference = find(point.reference_keyframe);
   return reference && reference->map == map;
@@ -97,7 +97,7 @@ std::vector<KeyFrameId> Map::erase_map(MapIndex map) {
   return dying;
 }
 
-/// Turns the way up to the root round, so that the keyframe has no parent any more.
+/// Reverses the path to the root, so that the keyframe becomes the root.
 void Map::make_root_of_tree(KeyFrame& keyframe) {
   KeyFrameId below = keyframe.id, at = keyframe.parent;
   keyframe.parent = KeyFrameId();

@@ -23,15 +23,16 @@ inline bool precedes(const Observation& observation, KeyFrameId keyframe) {
   return observation.keyframe < keyframe;
 }
 
-/// Where a point is, and what follows from that and the poses of its observers.
+/// Position of a point, and the direction and scale range that follow from it and the poses of its
+/// observers.
 struct PointGeometry {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();
   double min_distance = 0, max_distance = 0;
 };
 
-/// A number that grows while others read the map: tracking adds to it at every image, and must not
-/// wait until each of those who copy the map has finished. See docs/method/threads.md#locks.
+/// A counter that may grow while other threads read the map. Tracking adds to it at every image,
+/// and must not wait for threads that copy the map. See docs/method/threads.md#locks.
 class SightingCount {
  public:
   explicit SightingCount(int n) : n_(n) {}

@@ -8,29 +8,28 @@
 
 namespace orbslam {
 
-/// New poses and positions for many keyframes and points. What follows from them (viewing
-/// directions and scale ranges of the points) is worked out before the write section, so that
-/// this only copies. See docs/method/loops.md#correction and
-/// docs/method/adjustment.md#full-bundle-adjustment.
+/// New poses and positions for many keyframes and points. Viewing directions and scale ranges of
+/// the points are computed before the write section, which therefore only copies. See
+/// docs/method/loops.md#correction and docs/method/adjustment.md#full-bundle-adjustment.
 class MapRewrite {
  public:
-  /// `rescaled`: lengths around the keyframe are multiplied by it.
+  /// `rescaled`: the factor of lengths around the keyframe.
   void move_keyframe(KeyFrameId id, const Pose& T_cw, double rescaled = 1);
   void move_point(MapPointId id, const Eigen::Vector3d& position);
 
-  /// Works out the points' geometry from the new poses, old ones where there is no new one. Takes
-  /// the read lock again and again for a short while: tracking notes something in the map at every
-  /// frame and would wait for the whole of a large one.
+  /// Computes the points' geometry from the new poses, or from the old pose of a keyframe without a
+  /// new one. Takes the read lock many times for a short while, because tracking writes to the map
+  /// at every frame and would have to wait for a large map.
   void prepare(const Map& map);
   /// The same in one go. The caller holds a lock.
   void prepare_locked(const Map& map);
-  /// Writes what still lives. Points whose observations have changed since prepare(), or that were
-  /// not prepared, are worked out now. The caller holds the write lock.
+  /// Writes the objects that still live. Points whose observations have changed since prepare(), or
+  /// that were not prepared, are computed now. The caller holds the write lock.
   void apply(Map& map) const;
 
   std::size_t n_keyframes() const { return keyframes_.size(); }
   std::size_t n_points() const { return points_.size(); }
-  /// The new pose, or nullptr where there is none.
+  /// The new pose; nullptr without one.
   const Pose* T_cw(KeyFrameId id) const;
 
  private:

@@ -94,7 +94,7 @@ bool Map::erase_keyframe(KeyFrameId id) {
     return false;
   }
   forget_covisibility(*dying);
-  // Only observed slots: an unpublished keyframe also holds matches that nobody knows of yet.
+  // Only observed slots: an unpublished keyframe also holds matches without an observation.
   for (std::size_t i = 0; i < dying->map_points.size(); ++i) {
     erase_observation(dying->map_points[i], id);
   }

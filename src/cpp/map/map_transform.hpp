@@ -6,10 +6,10 @@
 
 namespace orbslam {
 
-/// Moves all keyframes and points of a map: `x' = S x`. What follows from their places (viewing
-/// directions, scale ranges) is worked out anew, and lengths around the keyframes are noted as
-/// multiplied by the scale. Counts as a big change. Takes the write lock for all of it; nobody may
-/// work on the map meanwhile. Does nothing for a map without keyframes.
+/// Moves all keyframes and points of a map: `x' = S x`. Viewing directions and scale ranges are
+/// computed again, and KeyFrame::scale is multiplied by the scale. Counts as a big change. Holds
+/// the write lock throughout; no other thread may work on the map. Does nothing for a map without
+/// keyframes.
 void transform_map(Map& map, MapIndex which, const Similarity& S);
 
 }  // namespace orbslam

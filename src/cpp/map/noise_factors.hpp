@@ -7,9 +7,10 @@
 
 namespace orbslam {
 
-/// Standard deviation of aligned sightings over that of corners of the same pyramid level. It
-/// begins at 1, where it stays for a single camera, and follows what is measured slowly, as an
-/// exponential mean of the logarithm. Reading needs no lock; one thread writes.
+/// Ratio of two noises: the standard deviation of aligned pixels, divided by that of corners of the
+/// same pyramid level. It begins at 1, with depths at 0.2; a single camera keeps 1. Each
+/// measurement moves it a little (exponential mean of the logarithm). Any thread may read without a
+/// lock; one thread writes.
 class NoiseFactor {
  public:
   double value() const { return value_.load(std::memory_order_relaxed); }
@@ -40,7 +41,7 @@ class NoiseFactor {
   std::atomic<int> n_{0};
 };
 
-/// Of the aligned sightings of one camera: their positions, and their columns in the right image.
+/// The ratios of one camera: for positions, and for columns in the right image.
 struct NoiseFactors {
   NoiseFactor position, right;
 

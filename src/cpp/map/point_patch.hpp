@@ -11,8 +11,8 @@
 
 namespace orbslam {
 
-/// The reference sighting of a map point: what its other sightings are aligned to. It holds no
-/// length of the world, so that it stays true when the map moves. See
+/// The reference sighting of a map point, to which its other sightings are aligned. It holds no
+/// length of the world, so it stays valid when the map moves. See
 /// docs/method/alignment.md#references.
 struct PointPatch {
   ReferencePatch patch;
@@ -23,12 +23,13 @@ struct PointPatch {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();  ///< raw
 };
 
-/// Where a keyframe sees a point by its patch, beside the keypoint, which stays where it is.
+/// Pixel of a point in a keyframe, found by alignment of its patch. The keypoint itself does not
+/// change.
 struct AlignedSighting {
-  MapPointId point;          ///< the sighting of this point alone; invalid: nothing was tried
+  MapPointId point;          ///< the entry is for this point; invalid: not tried
   float u = 0, v = 0;        ///< undistorted pixels
   float right_u = 0;         ///< column in the (virtual) right image
-  float variance = 0;        ///< of u and of v, as the patch says [pixels^2]; 0: failed
+  float variance = 0;        ///< of u and of v, by the patch [pixels^2]; 0: failed
   float right_variance = 0;  ///< of the right column; 0: it has the noise of the keypoint
   bool reference = false;    ///< the patch was cut here
 

@@ -12,7 +12,7 @@ std::optional<double> median_scene_depth(const Map& map, const KeyFrame& keyfram
   for (const MapPointId id : keyframe.map_points) {
     if (const MapPoint* point = map.find(id)) {
       const Eigen::Vector3d p_c = keyframe.T_cw * point->position;
-      // A fisheye lens also shows what is beside the camera and behind it.
+      // A fisheye lens also shows points beside and behind the camera.
       depths.push_back(flat ? p_c.z() : p_c.norm());
     }
   }

@@ -7,7 +7,7 @@ namespace orbslam {
 
 void count_sightings(const Map& map, const TrackedFrame& frame,
                      const std::vector<MapPointId>& in_view) {
-  // Each point once, although the search may have matched what it saw in the frustum.
+  // Counts each point once: a point in view may also be matched.
   thread_local std::vector<MapPointId> visible;
   visible.assign(in_view.begin(), in_view.end());
   for (const MapPointId id : frame.map_points) {

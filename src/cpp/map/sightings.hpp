@@ -8,11 +8,11 @@
 
 namespace orbslam {
 
-/// Commits what tracking one frame says about its points: a point in view of the frame, or
-/// associated with it, was visible (once); an associated point that the pose optimisation kept was
-/// found. `in_view`: the points that the search of the local map saw in the frustum. Points that
-/// are dead or replaced by now are left out. Takes the read lock: counts grow while others read.
-/// See docs/method/tracking.md#matching-the-local-map.
+/// Counts the points of one tracked frame. A point in view of the frame, or associated with it, is
+/// counted as visible, once. An associated inlier is counted as found. `in_view`: the points that
+/// the search of the local map found in the frustum. Dead and replaced points are left out. Takes
+/// the read lock: counts grow while others read. See
+/// docs/method/tracking.md#matching-the-local-map.
 void count_sightings(const Map& map, const TrackedFrame& frame,
                      const std::vector<MapPointId>& in_view);
 

@@ -34,8 +34,8 @@ struct PointSnapshot {
   std::vector<std::int32_t> observation_counts;  ///< weighted: 2 with depth, else 1
 };
 
-/// Who sees what: the observations of ids[i] are entries offsets[i] .. offsets[i + 1] - 1, by
-/// ascending keyframe.
+/// Observations: those of ids[i] are entries offsets[i] .. offsets[i + 1] - 1, by ascending
+/// keyframe.
 struct ObservationSnapshot {
   std::vector<MapPointId> ids;
   std::vector<std::int64_t> offsets;  ///< ids.size() + 1 entries

@@ -18,9 +18,9 @@ struct Column {
   const Row& operator[](std::size_t i) const { return data[i]; }
 };
 
-/// The arrays of a map that was written down (MapContents as columns), of which nothing is known
-/// but their lengths: columns of one group are equally long, `offsets` has one entry more. The
-/// keypoints, which are most of it, may come in parts.
+/// The arrays of a stored map (MapContents as columns). Only their lengths are checked: columns of
+/// one group are equally long, and `offsets` has one entry more. The keypoints, which are most of
+/// it, may come in parts.
 struct StoredMap {
   std::int64_t next_keyframe = 0, next_point = 0;
   std::vector<CameraContents> cameras;
@@ -62,12 +62,12 @@ struct StoredKeypoints {
   ReadableKeypoints columns;  ///< as many as these keyframes' offsets say
 };
 
-/// Checks everything that restore_map() relies on before anything is allocated for it, but for the
-/// keypoints: ids ascend and refer to what is there, counts and sizes agree, poses are rigid,
-/// numbers are finite and in range, the spanning tree is a tree. Throws MapFileError with one
+/// Checks everything that restore_map() relies on, except the keypoints, before memory is
+/// allocated. Ids ascend and refer to existing objects, counts and sizes agree, poses are rigid,
+/// numbers are finite and in range, and the spanning tree is a tree. Throws MapFileError with one
 /// clause that names the thing.
 void check_stored_map(const StoredMap& stored);
-/// The same for keypoints, of a map that was found good.
+/// The same for the keypoints of a map that has passed check_stored_map().
 void check_stored_keypoints(const StoredMap& stored, const StoredKeypoints& keypoints);
 
 /// The frame of keyframe `row`, one of those whose keypoints are given; not described yet.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// check_stored_map(): nothing that comes from a file is trusted.
+// check_stored_map(): contents of a file are checked completely.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -12,7 +12,7 @@ namespace {
 
 /// Distance from 1 of the length of a unit quaternion: far above rounding, far below harm.
 constexpr double kUnitTolerance = 1e-9;
-/// Counters grow by one a frame for years before they come near.
+/// No run is long enough to reach this limit: counters grow by one per frame.
 constexpr std::int32_t kMaxCount = 1 << 30;
 /// Pixels; images are far smaller.
 constexpr float kMaxCoordinate = 1e6F;

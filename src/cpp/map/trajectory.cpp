@@ -36,7 +36,7 @@ void TrajectoryRecorder::check_epoch(const Map& map) const {
       "the map was cleared since the trajectory began; rebuild() before and clear() after it");
 }
 
-/// Where the frame is, or would be: ids ascend.
+/// Index of the frame, or where to insert it; ids ascend.
 std::size_t TrajectoryRecorder::place_of(FrameId frame) const {
   if (frames_.empty() || frames_.back() < frame) return size();
   const auto found = std::lower_bound(frames_.begin(), frames_.end(), frame);
@@ -74,7 +74,7 @@ void TrajectoryRecorder::record(const Map& map, const TrackedFrame& frame, bool 
   insert(lost_, at, is_lost);
 }
 
-/// Where a frame that has a pose is; size() for any other.
+/// Index of a frame with a pose; size() for any other.
 std::size_t TrajectoryRecorder::place_with_pose(FrameId frame) const {
   const std::size_t at = place_of(frame);
   const bool known = at < size() && frames_[at] == frame;

@@ -24,9 +24,9 @@ struct Trajectory {
 class TrajectoryRecorder {
  public:
   /// Appends a frame, or records one anew that is there already. Without a pose or a reference
-  /// keyframe it repeats the relative pose before it (at first: none, the frame then is lost
-  /// whatever the flag says). Takes the map's read lock.
-  /// Throws StateError when the map was cleared since the first record and clear() was not called.
+  /// keyframe it repeats the relative pose before it. Before the first pose there is none, and the
+  /// frame is always lost. Takes the map's read lock. Throws StateError when the map was cleared
+  /// since the first record and clear() was not called.
   void record(const Map& map, const TrackedFrame& frame, bool lost);
 
   /// All poses in one map (kNoMap: the active one), through culled keyframes as well, anchored at
@@ -35,21 +35,21 @@ class TrajectoryRecorder {
   /// there is none). Throws StateError as above.
   Trajectory rebuild(const Map& map, MapIndex which = kNoMap) const;
 
-  /// Pose of a recorded frame in the map as it is now; nothing for one that is lost or unknown. The
-  /// caller holds a lock of the map.
+  /// Pose of a recorded frame in the present map; none for a lost or unknown frame. The caller
+  /// holds a lock of the map.
   std::optional<Pose> T_cw(const Map& map, FrameId frame) const;
 
-  /// The keyframe that such a frame is relative to; an invalid id for any other.
+  /// The keyframe that the frame's pose is relative to; an invalid id for a lost or unknown frame.
   KeyFrameId reference(FrameId frame) const;
 
-  /// Gives a frame that has a pose another one, in the map as it is now. The caller holds a lock of
-  /// the map.
+  /// Replaces the pose of a frame that has one; the pose is in the present map. The caller holds a
+  /// lock of the map.
   void move(const Map& map, FrameId frame, const Pose& T_cw);
 
   /// Forgets the frames of one map, which is about to be dropped. Takes the map's read lock.
   void drop(const Map& map, MapIndex which);
 
-  /// Everything recorded, relative to the keyframes, as map files keep it.
+  /// All recorded frames, relative to their keyframes, as in map files.
   struct Entries {
     std::vector<double> timestamps;  ///< seconds
     std::vector<FrameId> frames;

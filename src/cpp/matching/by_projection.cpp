@@ -27,13 +27,13 @@ const Pose& require_pose(const TrackedFrame& frame, const char* verb) {
   return *frame.T_cw;
 }
 
-// Temporary points have no observations and give way to any point.
+// Temporary points have no observations; any point may replace them.
 bool holds_mapped_point(const TrackedFrame& frame, std::size_t keypoint) {
   const MapPointId held = frame.map_points[keypoint];
   return held.valid() && !is_temporary(held);
 }
 
-// The column in the right image may contradict a candidate that agrees in the left one.
+// A candidate that agrees in the left image may disagree in the right one.
 bool right_column_disagrees(const Frame& frame, std::size_t keypoint, double right_u,
                             float radius) {
   return frame.has_depth(keypoint) &&
@@ -103,7 +103,7 @@ struct LevelRange {
 
 enum class Motion { kSideways, kForward, kBackward };
 
-// A camera that moved by more than its baseline along its axis sees everything larger or smaller.
+// After a motion along the axis by more than the baseline, everything appears larger or smaller.
 Motion motion_along_axis(const Pose& T_cw, const Pose& T_lw, double baseline) {
   const double z = (T_lw * T_cw.center()).z();
   if (z > baseline) return Motion::kForward;

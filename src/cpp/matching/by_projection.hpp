@@ -8,7 +8,7 @@
 
 namespace orbslam {
 
-inline constexpr int kDescriptorHigh = 100;  ///< most differing bits when geometry guides
+inline constexpr int kDescriptorHigh = 100;  ///< most differing bits in a search window
 inline constexpr int kDescriptorLow = 50;    ///< most differing bits otherwise
 
 /// Matches the points of the last frame, outliers excepted, to keypoints of `current`, whose pose
@@ -28,7 +28,7 @@ inline constexpr int kDescriptorLow = 50;    ///< most differing bits otherwise
 int match_last_frame(TrackedFrame& current, const TrackedFrame& last, const PointBatch& points,
                      float radius, bool use_depth);
 
-/// What the frustum test says of a point in a frame; all zero when it is not visible.
+/// Result of the frustum test of a point in a frame; all zero when it is not visible.
 struct FrustumView {
   float u = 0, v = 0, right_u = 0;  ///< its pixel, and the column in the (virtual) right image
   float view_cosine = 0;            ///< between this view and the point's mean direction
@@ -41,12 +41,12 @@ struct FrustumView {
 /// Throws StateError when the frame has no pose.
 std::vector<FrustumView> project_into(const TrackedFrame& frame, const PointBatch& points);
 
-inline constexpr double kFrontalCosine = 0.998;  ///< above: seen nearly as it was mapped
+inline constexpr double kFrontalCosine = 0.998;  ///< above: close to the mean direction
 inline constexpr float kFrontalRadius = 2.5F;    ///< pixels of the predicted level
 inline constexpr float kObliqueRadius = 4.0F;    ///< the same for all other views
 
-/// Search radius around a projected point, in pixels of its predicted level: points seen nearly
-/// as they were mapped are predicted better.
+/// Search radius around a projected point, in pixels of its predicted level. It is smaller for a
+/// viewing direction close to the mean one, because the prediction is better.
 inline float viewing_radius(float view_cosine) {
   return static_cast<double>(view_cosine) > kFrontalCosine ? kFrontalRadius : kObliqueRadius;
 }

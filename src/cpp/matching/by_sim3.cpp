@@ -22,8 +22,8 @@ void require_size(const std::vector<MapPointId>& matches, const Frame& frame,
   }
 }
 
-/// One of two keyframes, copied under the lock: where it was, and its points that are to be
-/// searched for in the other, with the keypoints that see them.
+/// Copy of one of two keyframes, made under the lock: its pose, the points to search for in the
+/// other keyframe, and their keypoints.
 struct Side {
   std::shared_ptr<const Frame> frame;
   Pose T_cw;
@@ -82,7 +82,7 @@ std::vector<std::int32_t> search_one_way(const Side& from, const Frame& to, cons
     Eigen::Vector2d pixel;
     if (!to.camera->project(p, pixel)) continue;
     if (!to.camera->bounds().contains_half_open(pixel.x(), pixel.y())) continue;
-    // In the units of the map that the point comes from, like its scale range.
+    // In the units of the point's own map, like its scale range.
     const double distance = (p - to.camera->centre(pixel.x())).norm() / S.scale();
     const double farthest = from.points.max_distances[i];
     if (!in_scale_range(distance, from.points.min_distances[i], farthest)) continue;
@@ -94,8 +94,8 @@ std::vector<std::int32_t> search_one_way(const Side& from, const Frame& to, cons
   return found;
 }
 
-/// Looks for points of the world at the pose that S_cw stands for; `take(point, keypoint)` is told
-/// of every match before the next point is searched for.
+/// Searches points of the world from the pose of S_cw. Calls `take(point, keypoint)` for every
+/// match before the next point is searched.
 template <class Free, class Take>
 void search_loop_points(const Frame& frame, const Similarity& S_cw, const PointBatch& points,
                         float radius_factor, const Free& free, const Take& take) {

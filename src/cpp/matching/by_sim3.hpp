@@ -15,15 +15,14 @@ inline constexpr float kSimilarityRadius = 7.5F;
 inline constexpr float kLoopRadius = 10.0F;
 inline constexpr float kLoopFusionRadius = 4.0F;
 
-/// Further matches between two keyframes of which S_ab is known roughly. `matches` holds per
-/// keypoint of `a` the matched point of `b`, or an invalid id; matches are added to it where the
-/// point of a keypoint, carried through the similarity and searched for in the other image, finds a
-/// keypoint whose own point finds it back. A point is searched within `radius_factor` pixels of its
-/// predicted level, on that level or the next finer one; at most kDescriptorHigh bits differ.
-/// Distances are compared in the units of the map in which the point's scale range was measured.
-/// Returns the number of new matches, 0 when a keyframe is dead. Takes the read lock while it
-/// copies. Throws std::invalid_argument unless `matches` has one entry per keypoint of `a`. See
-/// docs/method/loops.md#verification.
+/// Finds further matches between two keyframes whose similarity S_ab is roughly known. `matches`
+/// holds per keypoint of `a` the matched point of `b`, or an invalid id. Points of each keyframe
+/// are transformed and searched in the other image; a match must be found in both directions. A
+/// point is searched within `radius_factor` pixels of its predicted level, on that level or the
+/// next finer one; at most kDescriptorHigh bits differ. Distances are compared in the units of the
+/// map in which the point's scale range was measured. Returns the number of new matches, 0 when a
+/// keyframe is dead. Takes the read lock while it copies. Throws std::invalid_argument unless
+/// `matches` has one entry per keypoint of `a`. See docs/method/loops.md#verification.
 int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Similarity& S_ab,
                         std::vector<MapPointId>& matches, float radius_factor = kSimilarityRadius);
 
@@ -44,9 +43,9 @@ struct PointSighting {
   std::uint32_t keypoint = 0;
 };
 
-/// The same search for a keyframe that is to be corrected. Keypoints may be occupied and may be
-/// found by several points, since what is found shows which points are the same; in the order of
-/// `points`. Takes no lock. See docs/method/loops.md#fusion-across-the-loop.
+/// The same search for a keyframe that is to be corrected. Keypoints may be occupied, and several
+/// points may match one keypoint, because the matches show which points are the same. The result is
+/// in the order of `points`. Takes no lock. See docs/method/loops.md#fusion-across-the-loop.
 std::vector<PointSighting> find_loop_fusions(const Frame& frame, const Similarity& S_cw,
                                              const PointBatch& points,
                                              float radius_factor = kLoopFusionRadius);

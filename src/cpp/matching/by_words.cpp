@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kFarthest = 256;
 
-// What a search needs of a keyframe, copied so that it can run without the lock.
+// The data of a keyframe for a search, copied so that the search runs without the lock.
 struct KeyFrameFeatures {
   std::shared_ptr<const Frame> frame;  // none: the keyframe is dead
   std::vector<MapPointId> points;      // living ones per keypoint, else invalid
@@ -37,7 +37,7 @@ void gather(const Map& map, KeyFrameId id, bool with_positions, KeyFrameFeatures
   }
 }
 
-// The acceptance loop that both searches share. `usable_b(j)` says which features of b compete,
+// The loop over features that both searches share. `usable_b(j)` says which features of b compete,
 // `pairs` receives (feature of a, feature of b) in node order.
 template <class UsableB>
 void match_nodes(const KeyFrameFeatures& a, const Frame& frame_b, float ratio, UsableB&& usable_b,

@@ -24,9 +24,9 @@ inline constexpr int kDescriptorUnguided =
 /// Matches the points of a keyframe to a frame without words: each feature that has a living point
 /// is compared with all of the frame's. Those match that are most alike on both sides, by
 /// kDescriptorUnguided bits at most and fewer than `ratio` times those of the second best. It takes
-/// some fifty times as long as by words, and finds what looks too different by now to fall under
-/// the same node. The rest is as by words; needs no description. See
-/// docs/method/words.md#without-words.
+/// some fifty times as long as matching by words. It also finds features that have changed so much
+/// that they belong to other nodes. Otherwise it works like matching by words. The frames need no
+/// words. See docs/method/words.md#without-words.
 int match_keyframe_by_descriptors(const Map& map, KeyFrameId keyframe, TrackedFrame& frame,
                                   float ratio);
 

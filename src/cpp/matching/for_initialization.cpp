@@ -19,7 +19,7 @@ constexpr int kInfinite = std::numeric_limits<int>::max();
 // A candidate of match_views: distance of descriptors, index in the current frame.
 using Candidate = std::pair<int, std::uint32_t>;
 
-/// The best candidate, if no other place looks nearly as much like what is wanted; -1 else.
+/// The best candidate, if no candidate at another place is nearly as similar; otherwise -1.
 int clear_winner(const std::vector<Candidate>& rated, const Frame& current, float ratio) {
   if (rated.empty()) return -1;
   const Candidate best = *std::min_element(rated.begin(), rated.end());

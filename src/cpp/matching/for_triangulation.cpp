@@ -40,7 +40,7 @@ std::optional<FreeFeatures> gather(const Map& map, KeyFrameId id) {
   return view;
 }
 
-// What the relative pose of two cameras says about a feature of 2 for a given feature of 1.
+// Epipolar constraint between features of two cameras with a known relative pose.
 class EpipolarGeometry {
  public:
   EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b)
@@ -91,7 +91,7 @@ class EpipolarGeometry {
   }
 
  private:
-  // Where every camera of 2 shows every camera of 1.
+  // Epipoles: the image of every camera of 1 in every camera of 2.
   void add_epipoles_of_rig() {
     for (std::size_t i = 0; i < camera_1_.n_cameras(); ++i) {
       auto& epipoles = epipoles_.emplace_back();
@@ -115,7 +115,8 @@ class EpipolarGeometry {
     }
   }
 
-  // Of a feature of 2 from the epipolar plane, whose normal in camera 2 is line_, in raw pixels.
+  // Distance [raw pixels] of a feature of 2 from the epipolar plane, whose normal in camera 2 is
+  // line_.
   double squared_distance(const Keypoint& feature_2) const {
     const Eigen::Vector3d ray = camera_2_.ray(feature_2.x, feature_2.y);
     const Eigen::Matrix3d B = camera_2_.sight(feature_2.x, feature_2.y).leftCols<3>();
@@ -147,7 +148,8 @@ FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
   FeaturePairs pairs;
   thread_local std::vector<std::uint32_t> free_b;
   for_each_common_node(frame_a, frame_b, [&](NodeFeatures node_a, NodeFeatures node_b) {
-    // Once for all features of a: which of b are left is a coin toss that no processor foresees.
+    // Computed once for all features of a, because the processor cannot predict which features of b
+    // are free.
     free_b.clear();
     for (const std::uint32_t j : node_b) {
       if (b.occupied[j]) continue;
@@ -157,13 +159,13 @@ FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
     if (free_b.empty()) return;
     for (const std::uint32_t i : node_a) {
       if (a.occupied[i]) continue;
-      bool selected = false;  // most features resemble none of b, and need no line
+      bool selected = false;  // most features have no similar one in b, and need no line
       int best = kDescriptorLow;
       std::int64_t match = -1;
       for (const std::uint32_t j : free_b) {
         const int distance = hamming_distance(frame_a.descriptors[i], frame_b.descriptors[j]);
         if (distance > best) continue;  // the last of equals wins
-        if (b.occupied[j]) continue;    // since a moment ago
+        if (b.occupied[j]) continue;    // matched to an earlier feature of a
         if (!selected) geometry.select(frame_a.keypoints[i]);
         selected = true;
         const Keypoint& feature = frame_b.keypoints[j];
@@ -196,7 +198,8 @@ struct NewPoint {
   Eigen::Vector3d position;
 };
 
-// Adds what still fits: both keyframes alive and unmoved, both keypoints still without a point.
+// Adds the points whose keyframes still live and have not moved, and whose keypoints are still
+// free.
 void commit(Map& map, KeyFrameId id_1, const Pose& T_1w, KeyFrameId id_2, const Pose& T_2w,
             const std::vector<NewPoint>& points, std::vector<MapPointId>& created) {
   const KeyFrame* keyframe_1 = map.find(id_1);

@@ -26,12 +26,11 @@ struct NewPointOptions {
 
 /// Triangulates new points between `current` and its best covisible keyframes and adds them to the
 /// map (Mur-Artal et al. 2015, section VI-C). A neighbour is left out when it is closer than the
-/// rig's baseline, with a single camera than 1 % of the median depth of its points. The features of
-/// match_for_triangulation() become a point where PairTriangulation says so, and where both
-/// keyframes still stand and both features are still without a point when it is added. Between
-/// neighbours it reads `should_stop` (a keyframe is waiting) and returns early; nullptr never
-/// stops. Takes short locks. Returns the new points, none for a dead keyframe. See
-/// docs/method/mapping.md#new-points.
+/// rig's baseline, with a single camera than 1 % of the median depth of its points. A pair of
+/// match_for_triangulation() becomes a point if PairTriangulation accepts it, both keyframes have
+/// not moved, and both features are still without a point. Between neighbours the function reads
+/// `should_stop` (a keyframe is waiting) and returns early; nullptr never stops. Takes short locks.
+/// Returns the new points, none for a dead keyframe. See docs/method/mapping.md#new-points.
 std::vector<MapPointId> create_new_points(Map& map, KeyFrameId current,
                                           const NewPointOptions& options,
                                           const std::atomic<bool>* should_stop);

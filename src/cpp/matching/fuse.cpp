@@ -77,7 +77,8 @@ void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& obs
   }
 }
 
-// Under the write lock: only what still stands is changed. Returns the number of changes.
+// Runs under the write lock, and changes only objects that still live and have not moved. Returns
+// the number of changes.
 int apply_fusions(Map& map, const Target& target, const PointBatch& points,
                   const std::vector<Fusion>& fusions) {
   const KeyFrame* keyframe = map.find(target.id);

@@ -9,9 +9,9 @@
 
 namespace orbslam {
 
-/// A small table from map point id to a number, for "is this point one of those" in loops over
-/// thousands of points. Open addressing in one flat buffer that is reused: no allocation once it
-/// has grown, and never iterated, so its inner order cannot leak into results
+/// A small hash table from map point id to a number, for look-ups in loops over thousands of
+/// points. It uses open addressing in one flat buffer, which is reused without allocation. It is
+/// never iterated, so its inner order cannot influence results
 /// (docs/method/threads.md#deterministic-mode).
 class PointIdIndex {
  public:

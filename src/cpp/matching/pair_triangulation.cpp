@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kMonoGate = 5.991;       // chi-square, 95 %, 2 degrees of freedom
 constexpr double kStereoGate = 7.8;       // 3 degrees of freedom, rounded as in the original
-constexpr double kWidestCosine = 0.9998;  // rays closer than 1.15 degrees say nothing of depth
+constexpr double kWidestCosine = 0.9998;  // rays closer than 1.15 degrees do not determine a depth
 constexpr double kScaleSlack = 1.5;       // in multiples of the pyramid's factor
 
 }  // namespace
@@ -80,7 +80,7 @@ std::optional<Eigen::Vector3d> PairTriangulation::locate(std::size_t i_1, std::s
       (depth_1 || depth_2 || parallax < kWidestCosine)) {
     return triangulate(ray_1, ray_2, view_1_.from_world(i_1), view_2_.from_world(i_2));
   }
-  // Equally wide: the first, so that the result does not depend on rounding alone.
+  // If both are equally wide, the first is used, so that rounding does not decide.
   if (depth_1 && parallax_1 <= parallax_2) return view_1_.T_wc * view_1_.frame->unproject(i_1);
   if (depth_2 && parallax_2 < parallax_1) return view_2_.T_wc * view_2_.frame->unproject(i_2);
   return std::nullopt;

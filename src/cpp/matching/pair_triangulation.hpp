@@ -9,11 +9,11 @@
 namespace orbslam {
 
 /// Decides whether a pair of matched features of two frames makes a map point, and where it lies.
-/// It is triangulated from the two rays when their parallax is wider than that of a measured depth
-/// over the rig's baseline and, without a depth, wider than 1.15 degrees; else it lies at the
-/// measured depth with the wider parallax, and without one there is no point. Then it must be in
-/// front of both cameras, reproject within a chi-square gate in both, and its distances must fit
-/// the levels of both features to 1.5 times the pyramid's factor. See
+/// The point is triangulated from the two rays if their parallax is wider than that of the measured
+/// depths over the baseline; without a measured depth it must be wider than 1.15 degrees. Otherwise
+/// the point is at the measured depth with the wider parallax; without a measured depth there is no
+/// point. The point must be in front of both cameras and pass a chi-square gate in both. Its
+/// distances must agree with the levels of both features to 1.5 times the pyramid's factor. See
 /// docs/method/mapping.md#new-points.
 class PairTriangulation {
  public:
@@ -29,7 +29,7 @@ class PairTriangulation {
     Pose T_cw, T_wc;
 
     Eigen::Vector3d ray(std::size_t i) const;
-    /// World to the axes of the body, from where the camera of keypoint i is.
+    /// World to the axes of the body, with the camera of keypoint i as origin.
     Pose from_world(std::size_t i) const;
     Eigen::Vector3d centre(std::size_t i) const;  ///< of that camera, in the world
     double depth_parallax(std::size_t i, double none) const;

@@ -7,7 +7,7 @@
 
 namespace orbslam {
 
-/// Where a world point appears: pixel, column in the (virtual) right image.
+/// Image of a world point: pixel, and column in the (virtual) right image.
 struct ImagePoint {
   double u = 0, v = 0, right_u = 0;
 };
@@ -24,7 +24,7 @@ class Projector {
         center_(T_cw.center()),
         camera_(*frame.camera) {}
 
-  /// Of the camera that sees a point at `image`, in the world.
+  /// Centre (world) of the camera that sees a point at `image`.
   Eigen::Vector3d center(const ImagePoint& image) const {
     if (!camera_.is_rig()) return center_;
     return rotation_.transpose() * (camera_.centre(image.u) - translation_);
@@ -61,7 +61,7 @@ class Projector {
 inline constexpr double kNearestFactor = 0.8;   ///< of a point's min_distance
 inline constexpr double kFarthestFactor = 1.2;  ///< of a point's max_distance
 
-/// Whether a point that is `distance` away can show the scales it was seen at (20 % slack).
+/// Whether a point at `distance` can be seen on the levels of the pyramid (20 % slack).
 inline bool in_scale_range(double distance, double min_distance, double max_distance) {
   return distance >= kNearestFactor * min_distance && distance <= kFarthestFactor * max_distance;
 }
@@ -73,7 +73,7 @@ inline bool seen_from_near_direction(double along, double distance) {
   return along >= kLeastViewCosine * distance;
 }
 
-/// Where a keyframe should show a point, and on which level of its pyramid.
+/// Predicted pixel and pyramid level of a point in a keyframe.
 struct ExpectedView {
   ImagePoint image;
   int level = 0;

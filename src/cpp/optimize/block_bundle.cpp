@@ -11,7 +11,7 @@ using bundle_kernels::kLanes;
 using bundle_kernels::PointRange;
 
 constexpr std::uint32_t kNone = ~std::uint32_t{0};
-/// Between the lists of two tasks: vectors that begin in one end before the other begins.
+/// Padding between the lists of two tasks, so that vectors of one list end before the next begins.
 constexpr std::uint32_t kGap = 2 * kLanes;
 
 bool is_finite(const BundleProblem::Observation& o) {

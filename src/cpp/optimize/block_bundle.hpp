@@ -10,12 +10,13 @@
 
 namespace orbslam {
 
-/// A bundle as the kernels want it: observations by point, those of free cameras (by camera) apart
-/// from those of fixed ones, on the normalised image plane. Memory is kept from one to the next.
+/// A bundle in the layout of the kernels: observations ordered by point, on the normalised image
+/// plane. Those of free cameras (by camera) are separate from those of fixed ones. Memory is reused
+/// for the next bundle.
 class BlockBundle {
  public:
-  /// Points are dealt to two tasks, whatever the number of threads: sums of a task and their order
-  /// do not depend on who works on it.
+  /// Points are dealt to two tasks, whatever the number of threads: the sums of a task and their
+  /// order do not depend on the thread.
   static constexpr std::size_t kTasks = 2;
 
   /// `usable`: per observation whether it has a weight at first.
@@ -29,7 +30,7 @@ class BlockBundle {
   /// Camera of the problem by view: free ones, then the others.
   const std::vector<std::uint32_t>& cameras() const { return cameras_; }
   bool has_point(std::size_t point) const { return finite_point_[point] != 0; }
-  /// Room that the arrays of a batch need.
+  /// Length of the arrays of a batch.
   std::size_t batch_size() const { return batch_size_; }
   /// Most observations of one point by free cameras.
   std::size_t longest() const { return longest_; }

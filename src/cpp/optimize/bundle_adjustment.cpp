@@ -74,8 +74,8 @@ double kernel_cost(double q, double width) {
   return q > width * width ? 2 * width * std::sqrt(q) - width * width : q;
 }
 
-/// Sum of squares of the observations that were usable at the start, robustified if wanted. One
-/// that has fallen behind its camera since is charged what it cost at the start.
+/// Sum of squares of the observations that were usable at the start, robustified if the options say
+/// so. An observation that is now behind its camera counts with its cost at the start.
 double total_cost(const BundleProblem& problem, const std::vector<double>& start,
                   const std::vector<double>& now, bool robust) {
   double sum = 0;

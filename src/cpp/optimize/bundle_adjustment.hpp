@@ -27,7 +27,7 @@ struct BundleProblem {
     float right_factor = 1;  ///< inverse variance of the right column over that of u and v
     bool has_depth = false;
   };
-  /// What an IMU beside a camera had, besides its pose.
+  /// State of an IMU at a camera, without its pose.
   struct Motion {
     std::uint32_t camera = 0;
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< in the world [m/s]
@@ -54,9 +54,10 @@ struct BundleProblem {
   Inertial inertial;
 };
 
-/// kBlocks is our own: blocks of fixed size, four lanes at once, the same bytes with any number of
-/// threads; for bundles whose keyframes nearly all share points (docs/method/adjustment.md#blocks).
-/// kCeres is for large and sparse ones, and a second opinion.
+/// kBlocks is this project's solver: blocks of fixed size, four lanes at once, the same bytes with
+/// any number of threads. It suits bundles in which nearly all keyframes share points
+/// (docs/method/adjustment.md#blocks). kCeres suits large and sparse bundles, and serves for
+/// comparison.
 enum class BundleSolver { kBlocks, kCeres };
 
 struct BundleOptions {
@@ -69,7 +70,7 @@ struct BundleOptions {
   /// Large maps, whose points of small parallax otherwise forbid long steps, need half the steps.
   /// With Ceres only.
   bool inverse_depth = false;
-  /// No iteration is begun that would probably end later; 0: no limit. What was reached is used.
+  /// No iteration is begun that would probably end later; 0: no limit. The result so far is used.
   double max_seconds = 0;
   BundleSolver solver = BundleSolver::kBlocks;
 };
@@ -79,7 +80,7 @@ struct BundleSummary {
   /// the start, robustified if the options say so.
   double initial_cost = 0, final_cost = 0;
   int iterations = 0;    ///< accepted steps; each lowered the cost of its stage
-  bool aborted = false;  ///< the flag was raised; parameters hold what was reached
+  bool aborted = false;  ///< the flag was raised; parameters hold the result so far
   bool stage_one_done = false;
   bool timed_out = false;             ///< max_seconds ended it
   std::vector<std::uint8_t> outlier;  ///< per observation, judged at the final estimate

@@ -34,7 +34,7 @@ constexpr double kNoise = 1e-11;
 // Bounds of curvatures that damp, as those of points in the kernels.
 constexpr double kLeastCurvature = 1e-6, kMostCurvature = 1e32;
 
-/// What a thread keeps from one bundle to the next.
+/// Memory that a thread reuses for the next bundle.
 struct Workspace {
   struct Sums {
     std::vector<double> blocks, cameras, reduced, scratch;
@@ -255,7 +255,7 @@ class BlockMinimiser final : public BundleMinimiser {
     inertial_->linearise(free_poses(w_.poses), H, b);
     Eigen::VectorXd damping = Eigen::VectorXd::Zero(size);
     for (Eigen::Index k = 0; k < size; ++k) {
-      // Cameras are damped by what images tell of them, in assemble().
+      // assemble() damps the cameras by the curvature of the images' residuals.
       if (k >= of_cameras) damping(k) = damping_of(H(k, k));
       H(k, k) += damping(k);
     }

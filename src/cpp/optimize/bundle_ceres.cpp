@@ -206,7 +206,7 @@ class CeresMinimiser final : public BundleMinimiser, public ceres::EvaluationCal
   ceres::Solver::Options solver_options(int iterations) {
     ceres::Solver::Options solver;
     solver.max_num_iterations = 2 * iterations;
-    solver.function_tolerance = 0;  // would throw the last step away; BundleIterations keeps it
+    solver.function_tolerance = 0;  // would discard the last step; BundleIterations keeps it
     solver.initial_trust_region_radius = kInitialTrustRadius;
     solver.num_threads = options_.n_threads;
     solver.logging_type = ceres::SILENT;

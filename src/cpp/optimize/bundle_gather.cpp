@@ -42,8 +42,8 @@ void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t
   bundle.kinds.push_back(kind);
 }
 
-/// The reference sighting of the point that was added last is as exact as those that were aligned
-/// to it. Without any it is a corner.
+/// The reference sighting of the last added point is as exact as the sightings that were aligned to
+/// it. Without such sightings it counts as a corner.
 void weigh_reference(GatheredBundle& bundle, const NoiseFactors& noise) {
   auto& observations = bundle.problem.observations;
   const auto point = static_cast<std::uint32_t>(bundle.points.size() - 1);

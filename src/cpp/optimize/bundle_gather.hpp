@@ -10,27 +10,27 @@
 
 namespace orbslam {
 
-/// What the position of an observation comes from.
+/// Source of the position of an observation.
 enum class ObservationKind : std::uint8_t {
   kKeypoint,      ///< the corner
-  kAligned,       ///< the patch of the point; its right column has the noise of the corner
-  kAlignedRight,  ///< the same, and the right column was aligned as well
-  kReference,     ///< the corner at which the patch was cut
+  kAligned,       ///< alignment of the patch; the right column has the noise of the corner
+  kAlignedRight,  ///< alignment of the patch, also in the right image
+  kReference,     ///< the corner from which the patch was cut
 };
 
-/// Part of a map copied into a BundleProblem, with the ids to find the way back. Filled under the
-/// map's read lock, solved without a lock, committed under the write lock. See
+/// Part of a map, copied into a BundleProblem, with the ids of its objects. Filled under the map's
+/// read lock, solved without a lock, committed under the write lock. See
 /// docs/method/adjustment.md#local-bundle-adjustment.
 struct GatheredBundle {
   BundleProblem problem;
   std::vector<KeyFrameId> keyframes;     ///< per camera of the problem
   std::vector<MapPointId> points;        ///< per point
   std::vector<std::uint32_t> keypoints;  ///< per observation: slot of its keyframe
-  std::vector<ObservationKind> kinds;    ///< per observation: what its position was measured by
+  std::vector<ObservationKind> kinds;    ///< per observation: source of its position
   std::uint64_t epoch = 0;               ///< of the map when it was gathered
   std::uint64_t big_changes = 0;         ///< Map::big_change_index() then
   MapIndex map_index = kNoMap;           ///< of a full bundle: the map that it is of
-  bool solved = false;  ///< the parameters are a result that is better than what was gathered
+  bool solved = false;  ///< the parameters are a result with a lower cost than the gathered ones
   std::unordered_map<KeyFrameId, std::uint32_t> camera_of;  ///< for look-ups only
 
   explicit GatheredBundle(const Map& map)
@@ -44,8 +44,8 @@ struct GatheredBundle {
   int n_fixed() const;
 };
 
-/// Writes poses of free cameras and positions of points of what still lives, and refreshes the
-/// points' geometry. The caller holds the write lock and has compared epochs.
+/// Writes poses of free cameras and positions of points that still live, and refreshes the points'
+/// geometry. The caller holds the write lock and has compared epochs.
 void write_back(const GatheredBundle& bundle, Map& map);
 
 /// Erases the flagged observations that are still there. Returns how many. Same conditions.

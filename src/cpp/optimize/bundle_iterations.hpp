@@ -10,11 +10,11 @@
 namespace orbslam {
 
 /// Ends a minimisation of Ceres by BundleStopRule, when `abort` is raised, or when another
-/// iteration as long as the last would go beyond `limit`. What was reached is kept. See
+/// iteration as long as the last would exceed `limit`. The result so far is kept. See
 /// docs/method/adjustment.md#stopping.
 class BundleIterations final : public ceres::IterationCallback {
  public:
-  /// The pointers may be nullptr: never.
+  /// The pointers may be nullptr: then they never end it.
   BundleIterations(int max_successful, double converged, const std::atomic<bool>* abort,
                    const TimeLimit* limit = nullptr)
       : rule_(max_successful, converged), abort_(abort), limit_(limit) {}

@@ -22,7 +22,7 @@ inline constexpr int kReducedSize = 8;  ///< right-hand side (6) and 2 without m
 inline constexpr int kStepSize = 8;     ///< rotation, 0, translation, 0
 /// Inverse of the lower Cholesky factor (6), that times g (3), g (3), damping (3), 0.
 inline constexpr int kPointStateSize = 16;
-/// Per observation of a point: three columns of six numbers, written as the products want them.
+/// Per observation of a point: three columns of six numbers, in the layout that the products need.
 inline constexpr int kRecordSize = 60;
 /// Arrays of scratch memory, each `scratch_stride` long, before the records.
 inline constexpr int kScratchArrays = 27;
@@ -52,14 +52,14 @@ struct PointRange {
   Index free_begin, free_end, fixed_begin, fixed_end;
 };
 
-/// What a kernel works on: a run of points, with memory of its own for what it sums.
+/// Input of a kernel: a run of points, with its own memory for sums.
 struct Task {
   Observations free, fixed;
   const PointRange* ranges;
   Index point_begin, point_end;
   double huber_mono, huber_stereo;  ///< widths of the kernels; 0: none
   double damping;
-  bool damp_scaled;  ///< by each unknown's curvature; otherwise all alike
+  bool damp_scaled;  ///< damping by each unknown's curvature; otherwise equal damping
   Index n_free;      ///< cameras
   // The present estimate.
   const double* views;
@@ -70,9 +70,9 @@ struct Task {
   Size stride;           ///< of these arrays
   double* point_states;
   // Sums of this task alone.
-  double* blocks;   ///< what elimination adds to H: columns of the lower triangle
+  double* blocks;   ///< added to H by elimination: columns of the lower triangle
   double* cameras;  ///< H and right-hand sides before elimination
-  double* reduced;  ///< what elimination subtracts from the right-hand sides
+  double* reduced;  ///< subtracted from the right-hand sides by elimination
   double* scratch;
   Size scratch_stride;
   // Of the back substitution.

@@ -153,9 +153,9 @@ inline Vector3 cross(const Vector3& a, const Vector3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Six numbers of a column as products of blocks want them: f0..f5 f0 f1, then f0 f0 f1 f1,
-// f2 f2 f3 f3, f4 f4 f5 f5. A block has its columns one after the other, so that two columns are
-// three vectors: rows 0 to 3 of one, rows 4, 5 of it and 0, 1 of the other, rows 2 to 5 of that.
+// Six numbers of a column in the layout of the block products: f0..f5 f0 f1, then f0 f0 f1 f1, f2
+// f2 f3 f3, f4 f4 f5 f5. A block has its columns one after the other, so that two columns are three
+// vectors: rows 0 to 3 of one, rows 4, 5 of it and 0, 1 of the other, rows 2 to 5 of that.
 constexpr int kColumnSize = 20;
 
 /// `low`: f0..f3, `high`: f4 f5 f0 f1.

@@ -11,20 +11,19 @@
 
 namespace orbslam {
 
-/// kEqual damps all unknowns alike, starting at 1e-5 times the largest curvature. It leaves weakly
-/// determined depths where they were while the rest converges, so that a stage of few iterations
-/// before the classification judges them as the published method does. kScaled damps every unknown
-/// in proportion to its own curvature and hardly at all, which needs half the iterations to
-/// converge.
+/// kEqual damps all unknowns equally, starting at 1e-5 times the largest curvature. Weakly
+/// determined depths hardly move while the rest converges. A first stage of few iterations then
+/// classifies them as the published method does. kScaled damps every unknown weakly, in proportion
+/// to its own curvature, and needs half the iterations to converge.
 enum class BundleDamping { kEqual, kScaled };
 
 // First damping over the largest curvature.
 inline constexpr double kInitialDamping = 1e-5;
-// Hardly damped steps converge quadratically: after one with a smaller relative decrease of the
-// cost than this, the next would change nothing that matters.
+// Weakly damped steps converge quadratically: after a step with a smaller relative decrease of the
+// cost than this, the next one changes nothing significant.
 inline constexpr double kConverged = 1e-4;
-// First damping by curvature is one over this. More than Ceres' default, but not so much that
-// depths of small parallax shoot beyond their mark and the step is rejected.
+// The first damping by curvature is one over this. It is larger than Ceres' default. A still larger
+// value would let depths of small parallax overshoot, and the step would be rejected.
 inline constexpr double kInitialTrustRadius = 1e5;
 
 struct BundleStage {

@@ -8,12 +8,12 @@
 namespace orbslam {
 namespace {
 
-/// Below this, a hundred times as far as at the start, a point is as good as infinitely far and
-/// moves only across: nothing says how far it is, so that steps would go on for ever.
+/// Below this, a hundred times as far as at the start, a point counts as infinitely far and moves
+/// only across its ray. Its depth is not determined, so steps along the ray would never end.
 constexpr double kInfinity = -2.5;
 
-/// Inverse depth relative to that at the start, and its derivative: 1 + r, bent for points that
-/// would pass infinity.
+/// Inverse depth relative to that at the start, and its derivative: 1 + r, limited so that it stays
+/// positive.
 struct InverseDepth {
   double value, derivative;
 };

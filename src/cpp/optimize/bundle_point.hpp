@@ -6,9 +6,9 @@
 namespace orbslam {
 
 /// A point of a bundle as a direction and an inverse depth seen from a fixed place (Civera et al.
-/// 2008; Montiel et al. 2006): what cameras see of a point is nearly linear in these, also where
-/// its depth is hardly known, so that steps may be long. The three parameters are 0 at the start.
-/// See docs/method/adjustment.md#full-bundle-adjustment.
+/// 2008; Montiel et al. 2006): its pixels are nearly linear in these parameters, even with an
+/// uncertain depth, so steps may be long. The three parameters are 0 at the start. See
+/// docs/method/adjustment.md#full-bundle-adjustment.
 class BundlePoint {
  public:
   static constexpr int kParameters = 3;
@@ -16,7 +16,7 @@ class BundlePoint {
   /// `place`: one of the point's observers, say; world. It does not move with that camera.
   BundlePoint(const Eigen::Vector3d& place, const Eigen::Vector3d& start);
   /// Moves to the given parameters: two slopes and the relative change of the inverse depth. The
-  /// point stays before the place whatever they are.
+  /// point stays in front of the place for any parameters.
   void move(const double* parameters);
 
   const Eigen::Vector3d& position() const { return position_; }  ///< world

@@ -60,8 +60,8 @@ struct BundleMeasurement {
   double factor = 0;         ///< scale times sqrt(rho'), of residuals and derivatives
   double residual[3] = {};   ///< u, v, right u: measurement minus prediction, times factor
 
-  /// Returns rho(q) - rho'(q) q: what the squared residuals lack of the robustified cost.
-  /// Points that the sight cannot compare have zero residuals.
+  /// Returns rho(q) - rho'(q) q: the robustified cost minus the weighted squared residuals. Points
+  /// that the sight cannot compare have zero residuals.
   double evaluate();
   /// Adds this observation's part of the diagonal of the Gauss-Newton matrix.
   void add_curvature(Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal) const;
@@ -100,9 +100,9 @@ class RightResidual final : public TwoResiduals<kFree> {
   const BundleMeasurement* measurement_;
 };
 
-/// Carries the part of the robustified cost that the weighted residuals lack, so that the total
-/// cost, its gradient and the Gauss-Newton matrix are those of ceres::HuberLoss on each
-/// observation. One per problem, on any point: it has no derivatives.
+/// Adds the part of the robustified cost that is missing in the weighted residuals. The total cost,
+/// its gradient and the Gauss-Newton matrix are then those of ceres::HuberLoss on each observation.
+/// One per problem, on any point: it has no derivatives.
 class MissingCost final : public ceres::SizedCostFunction<2, 3> {
  public:
   /// `sum` is that of BundleMeasurement::evaluate() over the problem.

@@ -23,9 +23,9 @@ class TimeLimit {
 /// Whether there is a flag and it is set.
 inline bool is_raised(const std::atomic<bool>* flag) { return flag != nullptr && flag->load(); }
 
-/// When a minimisation has taken enough steps: after `max_successful` successful ones, after three
-/// in a row with a relative decrease below 1e-3 or one below `converged`, after ten rejected ones
-/// in a row. See docs/method/adjustment.md#stopping.
+/// Decides when a minimisation ends: after `max_successful` successful steps, after three in a row
+/// with a relative decrease below 1e-3 or one below `converged`, after ten rejected ones in a row.
+/// See docs/method/adjustment.md#stopping.
 class BundleStopRule {
  public:
   BundleStopRule(int max_successful, double converged)

@@ -17,8 +17,9 @@ constexpr std::size_t kFewestSightings = 20;
 constexpr double kInlierShare = 0.5;
 constexpr double kOtherPose = 12.592;  // 95 % of chi-square, six degrees of freedom
 
-/// Whether the points say clearly that the frame is elsewhere. What is within the noise of its
-/// keypoints it shares with its neighbours as it was recorded, and alone if it is estimated anew.
+/// Whether the new pose differs significantly from the recorded one. A recorded pose shares its
+/// error with its neighbours. A new estimate within the noise of the keypoints would only add an
+/// error of its own.
 bool is_elsewhere(const Pose& recorded, const PoseEstimate& estimate) {
   const Vector6d change = (estimate.T_cw * recorded.inverse()).log();
   const Eigen::LDLT<Matrix6d> factor(estimate.covariance);
@@ -82,7 +83,7 @@ int FrameSightings::settle(const Map& map, TrajectoryRecorder& recorder, std::si
   return n_settled;
 }
 
-/// Nothing where the pose is to stay.
+/// None if the pose should not change.
 std::optional<Pose> FrameSightings::settled_pose(const Map& map, const TrajectoryRecorder& recorder,
                                                  FrameId frame, const Sightings& sightings) {
   std::optional<Pose> T_cw;

@@ -13,24 +13,24 @@
 
 namespace orbslam {
 
-/// What frames saw of the map, so that their poses can follow its points. A recorded frame moves
-/// with its reference keyframe; but the keyframes that come after it move each point in its own
-/// way, and a keyframe that was culled is adjusted no more. Not synchronised: one thread at a time.
-/// See docs/method/map.md#settled-frames.
+/// Observations of past frames, with which their poses are estimated again. A recorded frame moves
+/// with its reference keyframe. But later keyframes move each point differently, and a culled
+/// keyframe is no longer adjusted. Not synchronised: one thread at a time. See
+/// docs/method/map.md#settled-frames.
 class FrameSightings {
  public:
-  /// Keeps the inliers of a frame, in place of what was kept of it before; nothing of a frame that
-  /// has no pose or too few of them.
+  /// Stores the inliers of a frame, and replaces those stored before. Stores nothing for a frame
+  /// without a pose or with too few inliers.
   void keep(const TrackedFrame& frame);
   void forget(FrameId frame) { frames_.erase(frame); }
   void clear() { frames_.clear(); }
   std::size_t size() const { return frames_.size(); }
 
-  /// Estimates the poses of all but the `n_youngest` youngest frames from the points as they are
-  /// now, beginning where the recorder has them, and forgets those frames. Left as they were
-  /// recorded: lost frames, frames of living keyframes, which bundle adjustment has refined, those
-  /// that no longer agree with half of what they saw, and those whose pose is the same within its
-  /// noise. Takes the map's read lock frame by frame. Returns how many frames have a new pose.
+  /// Estimates the poses of all but the `n_youngest` youngest frames from the present points,
+  /// starting at the recorded poses, and forgets those frames. Four kinds of frames keep their
+  /// recorded pose: lost frames, frames of living keyframes (refined by bundle adjustment), frames
+  /// that agree with less than half of their observations, and frames whose pose is the same within
+  /// its noise. Takes the map's read lock frame by frame. Returns how many frames have a new pose.
   int settle(const Map& map, TrajectoryRecorder& recorder, std::size_t n_youngest);
 
  private:

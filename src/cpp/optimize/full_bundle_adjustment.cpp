@@ -7,8 +7,8 @@
 namespace orbslam {
 namespace {
 
-/// Maps of few keyframes have begun just now: their points are where two views have put them, and
-/// their coordinates do as well.
+/// Small maps have just begun. Their points come from two views, and coordinates suit them as well
+/// as inverse depths.
 constexpr std::size_t kManyKeyframes = 30;
 
 bool is_finite(const BundleProblem& problem) {

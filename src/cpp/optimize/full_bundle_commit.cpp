@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How the result of a full bundle adjustment gets into a map that has changed meanwhile.
+// Commits the result of a full bundle adjustment to a map that has changed since.
 #include <unordered_map>
 #include <vector>
 
@@ -9,7 +9,7 @@
 namespace orbslam {
 namespace {
 
-/// Preparations are repeated when the map changes before they are carried out, but not for ever.
+/// The preparation is repeated if the map changes before the write, up to a limit.
 constexpr int kPreparations = 3;
 
 /// The map's new geometry, and the version of the map that it was worked out for.
@@ -62,7 +62,7 @@ class KeyFrameMover {
       return;
     }
     const Pose* new_T_lw = leader != nullptr ? prepared_.rewrite.T_cw(leader->id) : nullptr;
-    if (new_T_lw == nullptr) return;  // nobody to follow
+    if (new_T_lw == nullptr) return;  // no leader
     const Pose T_cl = keyframe.T_cw * leader->T_cw.inverse();
     prepared_.rewrite.move_keyframe(keyframe.id, T_cl * *new_T_lw);
     ++prepared_.counts.n_followed_keyframes;
@@ -91,7 +91,8 @@ void move_points(const Map& map, const GatheredBundle& bundle, Preparation& prep
   });
 }
 
-/// Where everything goes, without what follows from it. The caller holds a lock.
+/// New poses and positions, without the points' directions and scale ranges. The caller holds a
+/// lock.
 Preparation prepare(const Map& map, const GatheredBundle& bundle) {
   Preparation prepared;
   prepared.structure_version = map.structure_version();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What a full bundle adjustment works on.
+// Gathers the bundle of a full bundle adjustment.
 #include <algorithm>
 #include <numeric>
 #include <vector>
@@ -47,7 +47,7 @@ std::vector<bool> largest_part(const BundleProblem& problem) {
   return chosen;
 }
 
-/// Takes away the other cameras, their observations, and the points that are then seen by nobody.
+/// Removes the other cameras, their observations, and the points without remaining observations.
 GatheredBundle reduce(const GatheredBundle& all, const std::vector<bool>& cameras, const Map& map) {
   GatheredBundle kept(map);
   kept.epoch = all.epoch;
@@ -78,8 +78,8 @@ GatheredBundle reduce(const GatheredBundle& all, const std::vector<bool>& camera
   return kept;
 }
 
-/// Copies points in slices, between which others may write: tracking notes something in the map at
-/// every frame and would wait for the whole of a large one.
+/// Copies points in slices, between which others may write. Tracking writes to the map at every
+/// frame, and would otherwise wait for a large map.
 void gather_points(const Map& map, const std::vector<MapPointId>& ids, GatheredBundle& bundle) {
   constexpr std::size_t kSlice = 2048;
   for (std::size_t begin = 0; begin < ids.size(); begin += kSlice) {

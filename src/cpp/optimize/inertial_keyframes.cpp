@@ -17,13 +17,13 @@ namespace {
 constexpr double kLongest = 5.0;
 // Longest time between neighbours [s] that culling may leave, near the newest keyframe and before.
 constexpr double kGap = 0.5, kGapBefore = 3.0;
-// How long before the newest keyframe the first one holds [s]: in this time one camera's scale
-// becomes known.
+// Age [s] up to which the short limit holds: in this time the scale of a single camera becomes
+// known.
 constexpr double kRecent = 15.0;
 // Times closer than this are the same [s]; seconds since 1970 are exact to 2e-7.
 constexpr double kSame = 1e-6;
-// Deviations of a bias from what it was before an adjustment, of the first motion of a chain that
-// nothing else holds: rad/s, m/s^2.
+// Standard deviations [rad/s, m/s^2] of the prior on the bias of the first motion in a chain, which
+// nothing else determines.
 constexpr double kGyroDeviation = 5e-3, kAccelDeviation = 0.1;
 
 }  // namespace

@@ -13,9 +13,9 @@ namespace orbslam {
 
 struct GatheredBundle;
 
-/// Samples of an IMU, and its velocities and biases at keyframes. Beside the map: what moves
-/// keyframes need not know of it, because velocities are kept in the axes of the keyframe, in units
-/// of the map. Has a lock of its own, which is taken after that of the map.
+/// Samples of an IMU, and its velocities and biases at keyframes. They are stored outside the map.
+/// Velocities are in the axes of the keyframe and in units of the map, so code that moves keyframes
+/// need not change them. The object has its own lock, which is taken after that of the map.
 class InertialKeyframes {
  public:
   InertialKeyframes(const Pose& T_cb, const ImuNoise& noise) : T_cb_(T_cb), noise_(noise) {}

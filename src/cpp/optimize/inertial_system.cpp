@@ -100,7 +100,7 @@ void InertialSystem::linearise(const std::vector<Pose>& poses, Eigen::MatrixXd& 
     const ImuResidual r =
         imu_residual(*link.motion, from, first.bias, to, problem_.inertial.gravity);
     const auto by_pose = [&](const Matrix9d& J, const ImuState& s) {
-      // A step of the camera turns the IMU by less its rotation, and moves it by less R times its
+      // A step of the camera turns the IMU by minus its rotation, and moves it by minus R times its
       // translation.
       return (-J.leftCols<3>() * to_body_.topRows<3>() -
               J.rightCols<3>() * (s.T_wb.rotation_matrix() * to_body_.bottomRows<3>()))

@@ -10,9 +10,9 @@
 
 namespace orbslam {
 
-/// The inertial part of a bundle: residuals of the IMU between cameras, of the walk of its biases
-/// and of what is known of them before. Unknowns are those of the free cameras, in the left tangent
-/// of T_cw, then nine for every free motion: velocity, gyro bias, accelerometer bias. See
+/// The inertial part of a bundle: residuals of the IMU between cameras, of the random walk of its
+/// biases and of their priors. Unknowns are those of the free cameras, in the left tangent of T_cw,
+/// then nine for every free motion: velocity, gyro bias, accelerometer bias. See
 /// docs/method/inertial.md#bundle-adjustment.
 class InertialSystem {
  public:

@@ -14,16 +14,17 @@
 namespace orbslam {
 namespace {
 
-/// The noise is read off where this share of the residuals lies: the gates, which depend on it,
-/// must keep the sightings whose errors are systematic.
+/// Quantile of the residuals from which the noise is measured. It is high, because the gates depend
+/// on the noise and must keep sightings with systematic errors.
 constexpr double kShare = 0.9;
 /// Quantiles of the chi-square distribution at that share, by degrees of freedom.
 constexpr double kOfOne = 2.7055435, kOfTwo = 4.6051702;
 /// Sightings that a thread takes at a time.
 constexpr std::size_t kChunk = 64;
-/// Noise of a depth sensor before it is measured: its first geometry is sure.
+/// Noise factor of a depth sensor before the first measurement. It is low, because the first
+/// geometry is reliable.
 constexpr double kFirstWithDepths = 0.2;
-/// Fewest residuals that say something of the noise.
+/// Least number of residuals for a measurement of the noise.
 constexpr std::size_t kFewestResiduals = 100;
 
 /// A keyframe with its images.
@@ -52,7 +53,7 @@ struct Point {
   std::optional<PlacedPatch> placed;
 };
 
-/// What the map holds of the sightings to be aligned.
+/// Data of the map about the sightings to be aligned.
 struct Task {
   std::vector<View> views;
   std::vector<Point> points;
@@ -191,7 +192,8 @@ double factor_of(std::vector<double>& squares, double quantile, double lost) {
   return std::sqrt(*at / quantile * lost);
 }
 
-/// The first factor counts alone: depths make the geometry of a young map sure.
+/// The first measurement replaces the initial factor, because depths make the geometry of a young
+/// map reliable.
 void follow(NoiseFactor& noise, double factor) {
   if (noise.n_measured() == 0 && factor > 0) noise.assume(std::min(factor, 1.0));
   noise.measure(factor);
@@ -252,13 +254,13 @@ void measure_noise(const GatheredBundle& bundle, NoiseFactors& noise) {
     const double right = camera.model->right_error(p, error, o.u, o.v, o.right_u);
     right_squares.push_back(corner * right * right);
   }
-  // Images alone bend to the errors of the calibration, so that residuals do not show these: the
-  // sightings of a single camera keep the noise of a corner.
+  // Without depths, poses and points absorb the errors of the calibration, and the residuals do not
+  // show them. The sightings of a single camera therefore keep the noise of a corner.
   if (!has_depths) return;
   const double n_free = static_cast<double>(problem.cameras.size()) - bundle.n_fixed();
   const double n_unknowns = 3 * static_cast<double>(problem.points.size()) + 6 * n_free;
   if (squares.size() < kFewestResiduals || !(n_residuals > 1.2 * n_unknowns)) return;
-  // The adjustment has taken so much of the noise into its unknowns.
+  // The unknowns of the adjustment absorb this part of the noise.
   const double lost = n_residuals / (n_residuals - n_unknowns);
   follow(noise.position, factor_of(squares, kOfTwo, lost));
   if (right_squares.size() < kFewestResiduals) return;

@@ -59,15 +59,15 @@ std::vector<KeyFrameId> outer_keyframes(const std::vector<const MapPoint*>& poin
   return outer;
 }
 
-/// Fixes the oldest keyframe where nothing else is, as long as another one stays free.
+/// Fixes the oldest keyframe if no other camera is fixed and another one stays free.
 void fix_gauge(GatheredBundle& bundle) {
   auto& cameras = bundle.problem.cameras;
   if (cameras.size() > 1 && bundle.n_fixed() == 0) cameras.front().fixed = true;
 }
 
-/// Holds the scale of what a single camera saw, where only one pose is fixed: images do not tell
-/// it, so it may be put back after the solution at no cost. A second fixed pose would hold it as
-/// well, and bend the map around what was known of that one at first.
+/// Keeps the scale of a single camera's map if only one pose is fixed. Images do not determine the
+/// scale, so it can be restored after the solution without a change of the cost. A second fixed
+/// pose would also keep the scale, but would distort the map by its initial error.
 class ScaleGauge {
  public:
   ScaleGauge(const GatheredBundle& bundle, bool monocular) {
@@ -113,7 +113,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, const InertialKeyframe
   if (keyframe == nullptr) return bundle;
   std::vector<KeyFrameId> in_time;
   if (inertial != nullptr) in_time = inertial->newest(map, keyframe->map, kInTime + 1);
-  // The oldest one holds the chain: it is fixed, and local only if it shares points.
+  // The oldest keyframe of the chain is fixed. It is local only if it shares points.
   const std::vector<KeyFrameId> chain = in_time;
   KeyFrameId held;
   if (in_time.size() > kInTime) {
@@ -141,8 +141,8 @@ GatheredBundle gather(const Map& map, KeyFrameId current, const InertialKeyframe
   return bundle;
 }
 
-/// Acquits aligned observations beyond their narrow gate whose corner still fits: the match is
-/// right, and the observation stays.
+/// Keeps aligned observations that fail their narrow gate if their corner still agrees: the match
+/// is right.
 void acquit_aligned(const GatheredBundle& bundle, const Map& map,
                     std::vector<std::uint8_t>& outlier) {
   for (std::size_t i = 0; i < outlier.size(); ++i) {
@@ -188,14 +188,14 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
   options.solver = solver;
   const ScaleGauge scale(bundle, monocular && result.n_imu_links == 0);
   result.summary = solve_bundle(bundle.problem, options, abort);
-  // Every accepted step lowers the cost; without one there is nothing to write.
+  // Every accepted step lowers the cost; without an accepted step nothing is written.
   const bool moved = result.summary.iterations > 0;
   if (!moved && !result.summary.stage_one_done) return result;
   if (moved) scale.restore(bundle.problem);
 
   const auto lock = map.write_lock();
   if (map.epoch() != bundle.epoch) return result;
-  // Unfinished estimates are no ground for erasing anything.
+  // Observations are not erased on the basis of an unfinished estimate.
   if (result.summary.stage_one_done) {
     acquit_aligned(bundle, map, result.summary.outlier);
     result.n_erased = erase_observations(bundle, result.summary.outlier, map);

@@ -22,8 +22,8 @@ struct LocalBundleResult {
 /// Refines `current`, its neighbours and all their points; other observers of these are fixed
 /// (Mur-Artal et al. 2015, section VI-D). Two stages (BundleOptions): with kernels, then without,
 /// on the inliers of the first. Gathers under the read lock, solves without a lock, and commits in
-/// one write section that re-checks what has died meanwhile. An epoch change in between drops the
-/// result, and a dead or unknown `current` gives an empty one (a reset may have been faster).
+/// one write section, which skips objects that have died since. If the map was cleared in between,
+/// the result is dropped. A dead or unknown `current` gives an empty result (after a reset).
 ///
 /// Fixed are the root of the map, the outer observers and, where there are none, the oldest local
 /// keyframe. With a single camera and one fixed pose the scale is kept as well: the distances of

@@ -79,8 +79,8 @@ int count_points(const Map& map, KeyFrameId id) {
 }
 
 /// The first keyframe is the origin, so scaling about it leaves its pose as it is. Scale range and
-/// direction of every point follow: the original leaves them as they were, and the first frames
-/// then miss points or look for them on the wrong level.
+/// direction of every point are scaled too. The original does not change them, so the first frames
+/// miss points or search them on the wrong level.
 void scale_map(Map& map, KeyFrameId second, double factor) {
   const Pose& T_21 = map.find(second)->T_cw;
   map.set_pose(second, Pose(T_21.rotation(), factor * T_21.translation()));
@@ -94,8 +94,7 @@ void scale_map(Map& map, KeyFrameId second, double factor) {
   }
 }
 
-/// Scales the median depth to 1, under the write lock. Every reason to fail is found before
-/// anything is scaled.
+/// Scales the median depth to 1, under the write lock. All checks come before the scaling.
 MonocularMapFailure normalise(Map& map, MonocularMap& made, std::size_t min_points) {
   made.n_points = count_points(map, made.second);
   const auto depth = median_scene_depth(map, *map.find(made.first));

@@ -18,7 +18,7 @@ enum class MonocularMapFailure {
   kNone,
   kFewPoints,   ///< fewer than `min_points` points in the second keyframe
   kBadDepth,    ///< the median depth is not a positive number
-  kMapCleared,  ///< somebody cleared the map meanwhile
+  kMapCleared,  ///< the map was cleared in between
 };
 
 struct MonocularMap {
@@ -36,9 +36,9 @@ struct MonocularMap {
 /// (Mur-Artal et al. 2015, section IV). Keyframe 0 (the world's frame) and 1 are made, the matched
 /// points are added with both observations, everything is refined by full bundle adjustment (20
 /// iterations, robust), and the map is scaled so that the median depth in the first keyframe is 1.
-/// Both keyframes are connected and published at the end, in one section with the scaling: nobody
-/// sees the map before. Local mapping takes them both, in order, afterwards; the points then enter
-/// its list of recent points with the second.
+/// Both keyframes are connected and published at the end, in one section with the scaling. Other
+/// threads do not see the map before. Local mapping takes them both, in order, afterwards; the
+/// points then enter its list of recent points with the second.
 ///
 /// `matches`: per keypoint of `initial` its partner in `current` or -1. `points`: per keypoint of
 /// `initial` its position in the frame of the initial camera, read where matched; matches whose

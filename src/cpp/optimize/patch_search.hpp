@@ -12,7 +12,7 @@
 
 namespace orbslam {
 
-/// A patch with the surface that it shows.
+/// A patch and its surface.
 struct PlacedPatch {
   const ReferencePatch* patch;
   const Camera* camera;        ///< of the reference

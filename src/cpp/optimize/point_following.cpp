@@ -50,7 +50,7 @@ std::vector<Source> sources_of(const Map& map, const TrackedFrame& earlier) {
   return sources;
 }
 
-/// The image as a frame without features: patches are looked for in it.
+/// The image as a frame without features, in which patches are searched.
 Frame empty_frame(const FrameContext& context) {
   Frame frame;
   frame.camera = context.camera;
@@ -68,7 +68,7 @@ std::size_t count_in_view(const std::vector<Source>& sources, const Camera& came
   }));
 }
 
-/// `step`: every so many of the sources.
+/// `step`: only every `step`-th source is searched.
 std::vector<Found> find_all(const std::vector<Source>& sources, std::size_t step,
                             const Frame& image, const Pose& T_cw, const ImagePyramid& pyramid,
                             const AlignmentOptions& options, int coarser) {
@@ -85,7 +85,7 @@ std::vector<Found> find_all(const std::vector<Source>& sources, std::size_t step
   return found;
 }
 
-/// None when too few agree.
+/// None when too few points agree.
 std::optional<Pose> pose_of(const std::vector<Found>& found, const FrameContext& context,
                             const Pose& T_cw) {
   std::vector<PoseObservation> observations(found.size());

@@ -25,9 +25,9 @@ struct FollowedPoints {
   std::size_t n_in_view = 0;               ///< of these, points that the pose puts into the image
 };
 
-/// Looks for the inliers of `earlier` in a grey image by their patches, without features: first a
-/// part of them on coarser levels around `T_cw`, the predicted pose, then all around the pose that
-/// these give. Takes the read lock for a short section. See
+/// Searches the inliers of `earlier` in a grey image by their patches, without features. First a
+/// part of them is searched on coarser levels around the predicted pose `T_cw`. Then all are
+/// searched around the pose from this part. Takes the read lock for a short section. See
 /// docs/method/alignment.md#frames-without-features.
 FollowedPoints follow_points(const Map& map, const FrameContext& context,
                              const TrackedFrame& earlier, const Pose& T_cw, const cv::Mat& grey);

@@ -60,8 +60,8 @@ double total_cost(const PoseGraph& graph) {
   return sum;
 }
 
-/// The fixed vertices, and the first vertex of every part of the graph that has none: held too, it
-/// makes the positions of the others determined.
+/// The fixed vertices, and the first vertex of every part of the graph without a fixed one, which
+/// is fixed as well to determine the others.
 std::vector<std::uint8_t> held_vertices(const PoseGraph& graph) {
   const std::size_t n = graph.S_iw.size();
   std::vector<std::size_t> first(n + 1, 0);  // neighbours of all vertices, one after the other
@@ -144,8 +144,8 @@ class PoseGraphSolver final : public ceres::EvaluationCallback {
     solver.max_num_consecutive_invalid_steps = kTrials;
     solver.initial_trust_region_radius = solver.max_trust_region_radius;  // Gauss-Newton
     solver.jacobi_scaling = false;
-    // BundleIterations ends by the cost. These end what starts at or gets to a cost of rounding
-    // errors only, where no step is accepted any more.
+    // BundleIterations ends by the decrease of the cost. These limits end a minimisation whose cost
+    // consists of rounding errors only, where no step is accepted any more.
     solver.function_tolerance = 0;
     solver.gradient_tolerance = 1e-12;
     solver.parameter_tolerance = 1e-10;
@@ -157,7 +157,7 @@ class PoseGraphSolver final : public ceres::EvaluationCallback {
     ceres::Solve(solver, &problem_, &report);
   }
 
-  /// Writes what was reached into the graph.
+  /// Writes the result so far into the graph.
   void store(PoseGraph& graph) {
     move();
     for (const std::size_t i : free_) graph.S_iw[i] = views_[i].S_iw();

@@ -20,7 +20,7 @@ struct TangentMap {
         D(m.block<3, 3>(3, 3)),
         e(m.block<3, 1>(3, 6)) {}
 
-  /// Makes this map follow Ad(S).
+  /// Multiplies this map by Ad(S).
   void multiply_by_adjoint(const Similarity& S) {
     const Eigen::Matrix3d R = S.rotation_matrix();
     const Eigen::Vector3d& t = S.translation();
@@ -30,8 +30,8 @@ struct TangentMap {
     D = (S.scale() * D * R).eval();
   }
 
-  /// Makes this map follow the one from the view's parameters to its left tangent, which is
-  /// [J, 0, 0; 0, Q, 0; 0, 0, 1] with the left Jacobian J and the turn Q.
+  /// Multiplies this map by that from the view's parameters to its left tangent, [J, 0, 0; 0, Q, 0;
+  /// 0, 0, 1] with the left Jacobian J and the rotation Q.
   void multiply_by_chart(const PoseGraphView& view) {
     A = A * view.left_jacobian();
     B = B * view.left_jacobian();

@@ -15,9 +15,9 @@ inline constexpr double kMaxLogScale = 100;
 /// S_iw = (exp(c) s, exp(w) R, exp(c) exp(w) (t + v)) with (s, R, t) the start. The camera turns
 /// and rescales about its own centre, and the centre moves by -R^T v / s whatever its turn and
 /// scale. To first order that is the left perturbation (rotation, translation, logarithm of the
-/// scale). Where scales or rotations have drifted far, steps that leave the centres alone take half
-/// the iterations of such that do not, and being a plain vector space the chart saves Ceres a
-/// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept. Four
+/// scale). After a large drift of scale or rotation, steps that do not move the centres need half
+/// the iterations of those that do. The chart is a plain vector space, which saves Ceres a product
+/// with a manifold's Jacobian per edge. Without the last parameter the scale is fixed. Four
 /// parameters (a, v) stand for w = a R e_z: a camera turns about the third axis of the world. See
 /// docs/method/adjustment.md#pose-graph.
 class PoseGraphView {
@@ -26,7 +26,7 @@ class PoseGraphView {
       : start_(S_iw), S_iw_(S_iw), up_(S_iw.rotation() * Eigen::Vector3d::UnitZ()) {}
 
   /// Moves to the given four, six or seven parameters, unless they are not finite or the logarithm
-  /// of the scale gets out of hand: then the view is not valid and stays where it was.
+  /// of the scale is too large. Then the view is invalid and does not move.
   void move(const double* parameters, int n_parameters);
   bool valid() const { return valid_; }
 

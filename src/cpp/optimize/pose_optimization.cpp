@@ -22,7 +22,7 @@ constexpr int kTrials = 10;
 constexpr int kMinObservations = 3;
 constexpr int kFewObservations = 10;  // below: one round only
 
-/// Everything a call needs; one per thread, so that calls after the first allocate nothing.
+/// Working memory of a call; one per thread, so that calls after the first do not allocate.
 struct Workspace {
   Group mono, stereo;
   std::vector<double> used_mono, used_stereo;  ///< weights of the last round
@@ -35,15 +35,15 @@ struct Workspace {
     used_mono.clear();
     used_stereo.clear();
   }
-  /// Notes the weights that a round is about to use; false if they are those of the last one.
+  /// Stores the weights for the next round; false if they equal those of the last round.
   bool note_weights() {
     const bool same = used_mono == mono.weight && used_stereo == stereo.weight;
     used_mono = mono.weight;
     used_stereo = stereo.weight;
     return !same;
   }
-  /// False, and nothing added, for a broken number, or a pixel at which the lens shows nothing: it
-  /// must not reach the sums.
+  /// Returns false and adds nothing for a number that is not finite, or for a pixel where the lens
+  /// shows nothing.
   bool add(const Camera& camera, const Eigen::Vector3d& position, double u, double v,
            double right_u, double inverse_sigma2, bool has_depth, double right_factor,
            std::size_t slot) {
@@ -119,7 +119,7 @@ class DampedStep {
       if (factor.info() == Eigen::Success) {
         const Vector6d step = factor.solve(equations.b);
         const Pose candidate = Pose::exp(step) * T_cw;
-        // Nearly all first trials succeed, and then the next system is needed at this very pose.
+        // Nearly all first trials succeed. The next normal equations are then needed at this pose.
         const bool optimistic = trial == 0;
         const double candidate_cost =
             evaluate(workspace_, camera_, candidate, robust_, optimistic ? &next_ : nullptr);
@@ -184,8 +184,8 @@ int classify(Group& group, bool stereo, const Camera& camera, const Pose& T_cw,
   return n_inliers;
 }
 
-/// Leaves out what lies behind the camera at a round's start: its mirror image would pull the pose,
-/// and no small step brings it to the front.
+/// Leaves out points behind the camera at the start of a round: their mirror images would bias the
+/// pose, and no small step moves them to the front.
 void leave_out_hidden(Group& group, const Camera& camera, const Pose& T_cw) {
   const Eigen::Matrix3d R = T_cw.rotation_matrix();
   for (std::size_t i = 0; i < group.size(); ++i) {
@@ -222,8 +222,8 @@ int count_residuals(const Workspace& w) {
   return n_residuals;
 }
 
-/// Covariance of observations and prior together. The variance of the residuals counts where it is
-/// above 1: the prior must not lend its certainty to a wrong image.
+/// Covariance of observations and prior together. The variance of the residuals is used if it is
+/// above 1, so that the prior does not hide large residuals of an image.
 Matrix6d covariance_with_prior(const Workspace& w, const Camera& camera, const Pose& T_cw) {
   NormalEquations images;
   const double cost = accumulate_mono(w.mono, camera, T_cw, 0.0, &images) +
@@ -261,7 +261,7 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
     Pose T_cw = T_cw_initial;
     leave_out_hidden(w.mono, camera, T_cw);
     leave_out_hidden(w.stereo, camera, T_cw);
-    // The same problem from the same pose ends as before.
+    // The same problem from the same pose has the same result.
     if (!w.note_weights() && round != kPlainRound) continue;
     estimate.iterations += minimise(w, camera, round != kPlainRound, T_cw);
     estimate.T_cw = T_cw;
@@ -273,7 +273,8 @@ void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
   estimate.covariance = covariance(w, camera, estimate.T_cw);
 }
 
-/// Adds what keypoint i is associated with; false, and nothing added, for broken numbers.
+/// Adds the association of keypoint i. Returns false and adds nothing for numbers that are not
+/// finite.
 bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
   const Frame& f = *frame.frame;
   if (const AlignedPixel* a = frame.aligned_at(i)) {
@@ -285,8 +286,8 @@ bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
                f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), 1.0, i);
 }
 
-/// An aligned sighting beyond its narrow gate still shows its point if the keypoint says so.
-/// Returns how many outliers become inliers.
+/// Makes an aligned sighting beyond its narrow gate an inlier if its keypoint is one. Returns how
+/// many outliers become inliers.
 int acquit_aligned(TrackedFrame& frame) {
   if (frame.aligned.empty()) return 0;
   const Frame& f = *frame.frame;

@@ -49,16 +49,16 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
                            const PosePrior* prior = nullptr);
 
 /// The same for a frame's associations, at their aligned positions where there are some
-/// (TrackedFrame::aligned). An aligned one is an outlier only if its keypoint is one as well. It:
-/// starts from its pose, and writes its pose and outlier flags (of all slots; those without a point
-/// get 0). `outlier` of the result stays empty, so that calls after a thread's first do not
-/// allocate. Throws StateError when the frame has no pose.
+/// (TrackedFrame::aligned). An aligned one is an outlier only if its keypoint is one as well.
+/// Starts from the frame's pose, and writes the frame's pose and outlier flags (of all slots; those
+/// without a point get 0). `outlier` of the result stays empty, so that calls after a thread's
+/// first do not allocate. Throws StateError when the frame has no pose.
 PoseEstimate optimize_pose(TrackedFrame& frame, const PosePrior* prior = nullptr);
 
-/// Covariance (rotation, translation; left perturbation) of the pose that a frame has, for
-/// associations that are off by as much as their keypoints are taken for: a frame whose keypoints
-/// became the points fits them without error, and tells nothing of that noise. Outliers take no
-/// part; zero where fewer than 3 associations are left. Throws StateError without a pose.
+/// Covariance (rotation, translation; left perturbation) of a frame's pose, from the assumed noise
+/// of its keypoints. Use it for a frame whose keypoints became the points: its residuals are zero,
+/// so they do not show the noise. Outliers take no part; zero where fewer than 3 associations are
+/// left. Throws StateError without a pose.
 Matrix6d pose_covariance(const TrackedFrame& frame);
 
 }  // namespace orbslam

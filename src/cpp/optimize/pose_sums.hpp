@@ -27,7 +27,7 @@ struct Task {
   const double* right_u;  ///< pixels; read in the group with depth alone
   const double* weight;
   const double* right_factor;  ///< weight of the right column over that of u and v
-  bool has_sights;             ///< false: the camera is a pinhole, and u and v say the same
+  bool has_sights;             ///< false: the camera is a pinhole, and u and v suffice
   const double* sight[12];     ///< by rows of three, then the last column
   double rotation[9];          ///< R_cw by rows
   double translation[3];

@@ -127,8 +127,8 @@ void SightingAlignment::align_one(std::size_t observation, const Pyramids& image
   if (point.reference != observation) {
     sighting.left = match(point, frame, T_cw, images.left, start);
   }
-  // The two images of a pair are rectified: what is raw and what is not are the same. The right
-  // camera of a fisheye pair is not known here.
+  // Raw and undistorted pixels of a rectified pair are equal. The right camera of a fisheye pair is
+  // not known here.
   if (images.right.levels.empty() || !o.has_depth || !frame.camera->is_pinhole()) return;
   const Pose T_rc(Eigen::Matrix3d::Identity(), {-frame.camera->baseline(), 0, 0});
   sighting.right = match(point, frame, T_rc * T_cw, images.right, {sighting.right_u, start.y()});

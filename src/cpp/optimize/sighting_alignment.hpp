@@ -26,9 +26,9 @@ struct AlignmentNoise {
   double deviation = 0;  ///< median standard deviation, so scaled [pixels of the level]
 };
 
-/// Full bundle adjustment with sightings that are aligned to each other: in every image the
-/// position of a point is moved to where the image looks like the point's reference sighting.
-/// Images are handed over one after the other and are not kept. See docs/method/alignment.md.
+/// Full bundle adjustment with sightings that are aligned to each other. In every image, the pixel
+/// of a point is moved until the image agrees with the point's reference sighting. Images are
+/// passed one after the other and are not kept. See docs/method/alignment.md.
 ///
 /// Order: take_references() for all images; then rounds of begin_round(), align() for all images,
 /// weigh() and solve(); at last commit(). The map must not change meanwhile.
@@ -38,7 +38,7 @@ class SightingAlignment {
   explicit SightingAlignment(const Map& map, MapIndex which = kNoMap,
                              AlignmentOptions options = {});
 
-  /// Keyframes of the bundle, whose images are wanted.
+  /// Keyframes of the bundle, whose images must be passed.
   const std::vector<KeyFrameId>& keyframes() const { return bundle_.keyframes; }
   const GatheredBundle& bundle() const { return bundle_; }
 
@@ -46,7 +46,7 @@ class SightingAlignment {
   /// keyframe that is not in the bundle, and ImageError for an image that is not one of 8 bits of
   /// the size of its camera.
   void take_references(KeyFrameId keyframe, const cv::Mat& grey);
-  /// Computes where the patches lie by the present poses and points; forgets the last round.
+  /// Predicts the pixels of the patches from the present poses and points; forgets the last round.
   void begin_round();
   /// Aligns the sightings in a keyframe. `right`: of a rectified pair, for the columns of stereo
   /// observations; empty if there is none: these columns then keep their disparity. Throws as
@@ -54,7 +54,7 @@ class SightingAlignment {
   void align(KeyFrameId keyframe, const cv::Mat& grey, const cv::Mat& right);
   /// Puts positions and weights of aligned sightings into the bundle.
   void weigh();
-  /// Adjusts. A step that makes nothing better leaves the result of the round before.
+  /// Adjusts. If no step lowers the cost, the result of the round before stays.
   BundleSummary solve(const FullBundleOptions& options, const std::atomic<bool>* abort,
                       int n_threads);
   FullBundleCommit commit(Map& map) { return commit_full_bundle(map, bundle_); }
@@ -67,7 +67,7 @@ class SightingAlignment {
   double median_error() const;
 
  private:
-  /// What became of a patch in an image.
+  /// Result of a patch in an image.
   struct Match : FoundPatch {  // in the right image u alone is used
     bool tried = false;
     bool ok() const { return tried && FoundPatch::ok(); }

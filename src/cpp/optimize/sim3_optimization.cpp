@@ -95,7 +95,7 @@ class Refinement {
       add(sim3_residuals::inverse(S_12, camera_2_, matches_[i]), system);
     }
     if (options_.fix_scale) {
-      // Decouples sigma from the rest; with nothing on its right-hand side it does not move.
+      // Decouples sigma from the rest; its right-hand side is zero, so it does not change.
       system.H.row(6).setZero();
       system.H.col(6).setZero();
       system.b(6) = 0;

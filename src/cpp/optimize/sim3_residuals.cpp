@@ -21,7 +21,7 @@ std::optional<Residual> residual(const Eigen::Vector3d& p_c,
                                  double inverse_sigma2) {
   const Sight B = camera.sight(pixel.x(), pixel.y());
   const Eigen::Vector3d q = apply(B, p_c);
-  // Behind the camera as well: an adjustment may lead a point through its plane and back.
+  // Also valid behind the camera: a point may pass through the camera's plane during an adjustment.
   if (!(std::abs(q.z()) > kTinyDepth)) return std::nullopt;
   const double weight = std::sqrt(inverse_sigma2), inverse_q = 1 / q.z();
   const Eigen::Vector2d predicted = q.head<2>() * inverse_q;

@@ -14,7 +14,7 @@ using Jacobian = Eigen::Matrix<double, 2, 7>;
 struct Residual {
   Eigen::Vector2d error;
   Jacobian jacobian;
-  double depth = 0;  ///< of the projected point; the sides of the camera's plane are told apart
+  double depth = 0;  ///< of the projected point; its sign is the side of the camera's plane
 };
 
 /// In image 1, of S_12 point_2. Nothing for a point on the plane of the camera.

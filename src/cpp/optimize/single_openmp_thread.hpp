@@ -8,14 +8,14 @@
 namespace orbslam {
 
 /// While it lives, parallel OpenMP regions that this thread enters have no other threads. CHOLMOD
-/// asks for four of its own whatever the caller wants; they would take the processor from tracking
-/// and, on two processors, end no sooner. See docs/decisions.md, number 30.
+/// always asks for four threads of its own. They would take processor time from tracking and, on
+/// two processors, would not be faster. See docs/decisions.md, number 30.
 class SingleOpenMpThread {
  public:
 #ifdef ORBSLAM2PY_OPENMP
   SingleOpenMpThread() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
   ~SingleOpenMpThread() {
-    // Old run-time libraries have one setting for all threads: somebody else restores it then.
+    // Old run-time libraries have one setting for all threads; then another thread restores it.
     if (levels_ > 0) omp_set_max_active_levels(levels_);
   }
 #else

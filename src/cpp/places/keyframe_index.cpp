@@ -124,7 +124,7 @@ std::vector<PlaceCandidate> KeyFrameIndex::query(const WordVector& words, const 
     best_group = std::max(best_group, group_score);
   }
 
-  // Of several groups with the same best keyframe the strongest speaks for it.
+  // Of several groups with the same best keyframe the one with the highest score counts.
   std::sort(groups.begin(), groups.end(), [](const PlaceCandidate& a, const PlaceCandidate& b) {
     return a.keyframe != b.keyframe ? a.keyframe < b.keyframe : a.group_score > b.group_score;
   });

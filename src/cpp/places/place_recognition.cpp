@@ -35,7 +35,7 @@ void index_keyframe(KeyFrameIndex& index, const Map& map, KeyFrameId id) {
   std::shared_ptr<const Frame> frame = frame_of(map, id);
   if (frame == nullptr) return;
   index.add(id, std::move(frame));
-  // It may have died, and been erased in vain, between the two steps above.
+  // The keyframe may have died between the two steps above, when it was not in the index yet.
   if (frame_of(map, id) == nullptr) index.erase(id);
 }
 

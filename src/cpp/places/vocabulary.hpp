@@ -56,8 +56,8 @@ struct NodeProblem {
 /// weights are finite and not negative.
 std::optional<NodeProblem> find_problem(int branching, int depth, const NodeRows& rows);
 
-/// Where a descriptor ends when it descends the tree, at every node to the nearest child, the first
-/// of equals.
+/// The leaf of a descriptor. At every node the descent takes the nearest child, or the first of
+/// equal ones.
 struct Quantised {
   std::uint32_t word = 0;
   std::uint32_t node = 0;  ///< ancestor at kDirectIndexDepth, or the leaf if it is shallower
@@ -65,8 +65,8 @@ struct Quantised {
 };
 
 /// A tree over ORB descriptors whose leaves are the visual words (Galvez-Lopez and Tardos, 2012).
-/// Immutable, shared by threads and systems. Node numbers seen from outside are those of the text
-/// format. Either memory-mapped from the binary format or built from a list of nodes. See
+/// Immutable, shared by threads and systems. The public interface numbers nodes as the text format
+/// does. Either memory-mapped from the binary format or built from a list of nodes. See
 /// docs/method/words.md#vocabulary.
 class Vocabulary {
  public:
@@ -95,8 +95,8 @@ class Vocabulary {
   std::size_t n_nodes() const;  ///< the root included
   std::size_t n_words() const;
   std::uint64_t hash() const;  ///< of the content, quick
-  /// What the content is, for a hash that cannot be forged: the tree's parameters and its sections,
-  /// as pieces of memory that live as long as the vocabulary.
+  /// The content for a cryptographic hash: the tree's parameters and its sections, as pieces of
+  /// memory that live as long as the vocabulary.
   std::vector<std::string_view> content() const;
   std::string comment() const;      ///< where it comes from, its licence
   VocabularySource source() const;  ///< the text file it was made from, if any

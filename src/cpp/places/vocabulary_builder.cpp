@@ -34,7 +34,7 @@ Children list_children(const NodeRows& rows) {
   Children lists;
   lists.offsets.assign(rows.count + 2, 0);
   lists.children.resize(rows.count);
-  // Counts are kept one place further up, so that filling in turns ends into begins.
+  // Counts are stored one place further up, so that the filling loop turns each end into a begin.
   for (std::size_t i = 0; i < rows.count; ++i) ++lists.offsets[rows.parents[i] + 2];
   for (std::size_t i = 2; i < lists.offsets.size(); ++i) lists.offsets[i] += lists.offsets[i - 1];
   for (std::size_t i = 0; i < rows.count; ++i) {

@@ -199,7 +199,7 @@ void VocabularyImage::check_header(const std::string& name) const {
     fail(name, std::to_string(size()) + " bytes, expected " + std::to_string(h.total_size) +
                    "; the file is incomplete");
   }
-  // Also a file with a matching checksum is not trusted: the offsets must be the ones of its sizes.
+  // A matching checksum is not enough: the offsets must agree with the sizes.
   const bool plausible = h.n_nodes >= 2 && h.n_nodes <= kMaxNodes && h.n_words >= 1 &&
                          h.n_words < h.n_nodes && h.comment_size <= size();
   VocabularyHeader expected = h;
@@ -232,7 +232,7 @@ void VocabularyImage::check_tree(const std::string& name) const {
       good = links[node] == next_child && counts[node] <= h.branching && level < h.depth;
       next_child += counts[node];
     }
-    // A node that is nobody's child ends the numbering too early.
+    // A node without a parent ends the numbering too early.
     good = good && node < next_child;
   }
   if (!good || next_child != h.n_nodes || n_leaves != h.n_words) {

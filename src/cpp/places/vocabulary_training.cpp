@@ -130,8 +130,8 @@ class TreeGrower {
     }
   }
 
-  /// False when cancelled. Only the calling thread may speak to the caller, and it does so when
-  /// a thousandth more is done, or once per iteration while a large node takes all threads.
+  /// False when cancelled. Only the calling thread calls back. It does so after each further
+  /// thousandth of the work, or once per iteration while all threads work on a large node.
   bool report(bool always) {
     if (cancelled_) return false;
     if (!progress_ || std::this_thread::get_id() != caller_) return true;

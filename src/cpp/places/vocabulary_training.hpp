@@ -30,8 +30,8 @@ struct TrainingSet {
   std::vector<std::size_t> image_ends;  ///< per image: one past its last descriptor
 };
 
-/// Hears the fraction done, 0 to 1, on the calling thread; false cancels, and nothing more is
-/// heard.
+/// Called with the fraction done, 0 to 1, on the calling thread. False cancels, and there are no
+/// further calls.
 using TrainingProgress = std::function<bool(double)>;
 
 /// Hierarchical k-means (Nister and Stewenius, 2006, on binary descriptors as in Galvez-Lopez and

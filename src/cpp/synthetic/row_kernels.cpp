@@ -58,7 +58,7 @@ void claim(Line inverse_depth, int first, int last, std::int64_t owner, double* 
   }
 }
 
-/// What shade() reads of the bitmaps of `index`, which most often is one for all lanes.
+/// Data of the bitmaps of `index` for shade(); the index is usually the same for all lanes.
 struct Level {
   IntegerVector offset, stride;
   FloatVector scale, max_x, max_y;
@@ -83,7 +83,7 @@ struct Level {
   }
 };
 
-/// The byte at each offset and the next one, above it; what stands above both is of no influence.
+/// The byte at each offset, and above it the next byte; higher bits have no influence.
 HWY_INLINE WordVector neighbours(const std::uint8_t* pixels, IntegerVector offset) {
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
   return hn::GatherOffset(Words(), reinterpret_cast<const std::uint32_t*>(pixels), offset);
@@ -133,8 +133,8 @@ HWY_INLINE FloatVector rough_log2(FloatVector value) {
   return hn::Sub(hn::Mul(bits, hn::Set(d, 0x1p-23F)), hn::Set(d, 127.0F));
 }
 
-/// Where the pixels of a row meet the texture, and how far from there their neighbours to the
-/// right (ux, vx) and below (uy, vy) do [texels].
+/// Texture coordinates [texels] of the pixels of a row, and the steps to their neighbours to the
+/// right (ux, vx) and below (uy, vy).
 struct Footprints {
   FloatVector u, v, ux, vx, uy, vy;
 };
@@ -148,7 +148,7 @@ HWY_INLINE FloatVector filtered(const TextureLevels& levels, const Footprints& a
   const auto longer = hn::Max(length_x, length_y);
   const auto cross = hn::Sub(hn::Mul(at.ux, at.vy), hn::Mul(at.uy, at.vx));
   const auto shorter = hn::Div(hn::Abs(cross), longer);
-  // Where the shorter side is (nearly) nothing, the quotient is not looked at.
+  // If the shorter side is almost zero, the quotient is not used.
   const auto narrow = hn::Ge(longer, hn::Mul(most, shorter));
   const auto ratio = hn::Div(longer, hn::IfThenElse(narrow, one, shorter));
   const auto rounded =

@@ -25,8 +25,8 @@ struct TextureLevels {
   float max_x[kMost], max_y[kMost];  ///< centre of the last pixel
 };
 
-/// One rectangle along one image row: inverse depth, and the coordinates a and b in its plane over
-/// depth [1 and metres per metre], with what they gain from one row to the next.
+/// One rectangle along one image row: inverse depth, and the plane coordinates a and b divided by
+/// depth [1/m, and metres per metre], with their increments from one row to the next.
 struct TexturedRow {
   Line inverse_depth, a, b;
   double inverse_depth_down, a_down, b_down;

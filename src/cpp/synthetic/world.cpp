@@ -14,7 +14,7 @@
 namespace orbslam::synthetic {
 namespace {
 
-// 2^29 texels are 700 MB; more than that is a slip of the pen, not a world.
+// 2^29 texels are 700 MB; a larger world is probably a typing error.
 constexpr double kMostTexels = 536870912.0;
 
 void check(const Rectangle& rectangle, std::size_t index) {

@@ -152,7 +152,7 @@ class Cache:
         return sizes
 
     def _remove(self, key: str) -> bool:
-        """Remove content that nobody uses; False if somebody does."""
+        """Remove content that is not in use; False if it is in use."""
         try:
             with self._locked(key, fcntl.LOCK_EX | fcntl.LOCK_NB):
                 shutil.rmtree(self.folder / key, ignore_errors=True)

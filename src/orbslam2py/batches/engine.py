@@ -35,7 +35,7 @@ _MOST_DEATHS = 20
 _PATIENCE = 10.0
 #: Bytes with which a scheduler may greet: some hundreds say what it is and can.
 _LONGEST_GREETING = 1 << 24
-#: Seconds after which it is looked at whether the batch is to be stopped.
+#: Seconds between checks whether the batch should stop.
 _LOOK_AROUND = 0.5
 #: Libraries that would start as many threads as there are cores, in every worker.
 _THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -98,7 +98,7 @@ def open_workers(workers: Workers, most: int | None = None) -> Iterator[Any]:
             "distributed.scheduler.allowed-failures": _MOST_DEATHS,
             "distributed.nanny.pre-spawn-environ": limits,
             "distributed.worker.profile.enabled": False,  # it looks at all threads every 10 ms
-            # Nobody sees its samples, two a second of which an hour would be kept.
+            # Its samples are not shown; it would keep two per second for an hour.
             "distributed.admin.system-monitor.log-length": 60,
             # Nor its messages and transitions, with all of the run in each of a thousand.
             "distributed.admin.low-level-log-length": 20,
@@ -246,7 +246,7 @@ class _Handed:
         job, attempt = self._running.pop(future)
         try:
             row = future.result()
-        except Exception as error:  # whatever ended it on the worker, or the worker itself
+        except Exception as error:  # any error that ended the run or the worker
             self._require_scheduler()
             if attempt < (_RETRIES if _is_an_error_of_the_run(error) else _MOST_DEATHS):
                 self.hand_over(job, attempt + 1)
@@ -259,8 +259,8 @@ class _Handed:
     def _require_scheduler(self) -> None:
         if self._client.status in ("closing", "closed"):
             raise DatasetError(
-                "the scheduler was lost; start it again, and go on with --resume: what was "
-                "finished is kept"
+                "the scheduler was lost; start it again, and continue with --resume: finished "
+                "runs are kept"
             )
 
 
@@ -300,7 +300,7 @@ def _greets(scheduler: str) -> bool:
     except TimeoutError:
         return False
     except OSError:
-        return True  # nobody is there, which Dask says
+        return True  # no scheduler answers, which Dask reports
     return len(greeting) == 8 and int.from_bytes(greeting, "little") <= _LONGEST_GREETING
 
 
@@ -318,7 +318,7 @@ def _client_of(distributed: Any, scheduler: str) -> Any:
     client = distributed.Client.__new__(distributed.Client)
     try:
         client.__init__(scheduler, timeout=_PATIENCE, set_as_default=False)
-    except Exception as error:  # whatever a program says that is no scheduler
+    except Exception as error:  # any reply of a program that is no scheduler
         with contextlib.suppress(Exception):
             client.close(timeout=_PATIENCE)
         if isinstance(error, OSError | TimeoutError):

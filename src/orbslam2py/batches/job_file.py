@@ -60,7 +60,7 @@ def read_document(path: Path) -> Mapping[str, Any]:
         raise SettingsError(f"{path} is no text in YAML; give a job file") from error
     except ValueError as error:  # of a date such as 2024-13-45
         raise SettingsError(
-            f"{path} is no YAML: {error}; put what is no date into quotes"
+            f"{path} is no YAML: {error}; put text that looks like a date into quotes"
         ) from error
     if not isinstance(document, Mapping):
         raise SettingsError(f"{path} holds no named values; it needs at least 'sequences:'")

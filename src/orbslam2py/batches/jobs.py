@@ -31,7 +31,7 @@ from orbslam2py.settings import Sensor
 
 _KEYS = ("sequences", "sensors", "settings", "options", "seeds", "sweep", "output")
 _SEQUENCE_KEYS = ("path", "name", "sensor", "settings", "topics")
-#: Most runs of a batch: nobody reads a larger table, and each job takes memory.
+#: Most runs of a batch: a larger table is not readable, and each job takes memory.
 _MOST_RUNS = 100_000
 
 

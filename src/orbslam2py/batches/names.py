@@ -18,7 +18,7 @@ _LONGEST = 255
 _KEPT = 80
 #: Digits of the fingerprints in names.
 DIGITS = 12
-#: What is harmless in names of files beside letters and digits.
+#: Characters that are allowed in names of files, beside letters and digits.
 SIGNS = "_.=+"
 
 

@@ -26,7 +26,7 @@ _ARCHIVES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tar.xz", 
 _NOT_MEANT = ("__MACOSX",)
 #: Bit of the flags of a file in a zip file.
 _ENCRYPTED = 0x1
-#: What a disk says to names that are too long, or to a file where a folder is.
+#: Errors of the file system for names that are too long, or for a file in the place of a folder.
 _ERRORS_OF_NAMES = (errno.ENAMETOOLONG, errno.EEXIST, errno.ENOTDIR, errno.EISDIR)
 
 
@@ -149,7 +149,7 @@ def _download(address: str, folder: Path, reserve: Callable[[int], None]) -> Non
 def _is_file(address: str, last: str, files: Any, path: str) -> bool:
     if is_archive(last):
         return True
-    if address.startswith("http"):  # only reading all of it would tell, which may take long
+    if address.startswith("http"):  # only reading all of it would show that, which may take long
         return "." in last and not address.endswith("/")
     return bool(files.isfile(path))
 
@@ -168,7 +168,7 @@ def _download_folder(files: Any, path: str, target: Path, reserve: Callable[[int
         (target / inner).parent.mkdir(parents=True, exist_ok=True)
         files.get_file(name, str(target / inner))
         got += (target / inner).stat().st_size
-        if got > known:  # the web does not tell sizes beforehand
+        if got > known:  # web servers do not give sizes in advance
             reserve(got)
 
 
@@ -246,7 +246,7 @@ def _read_to_the_end(stream: Any) -> None:
         while stream.read(1 << 20):
             pass
     except gzip.BadGzipFile as error:
-        if "Not a gzipped file" not in str(error):  # what else lies behind the end is not looked at
+        if "Not a gzipped file" not in str(error):  # anything behind the end is ignored
             raise
 
 

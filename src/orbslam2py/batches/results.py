@@ -78,7 +78,8 @@ class Results:
                 )
         elif not resume:
             raise DatasetError(
-                f"{self.address} holds a batch already; go on with --resume, or give another folder"
+                f"{self.address} holds a batch already; continue with --resume, or give another "
+                "folder"
             )
 
     def begin(self) -> None:
@@ -124,7 +125,10 @@ class Results:
 
     @contextlib.contextmanager
     def table(self) -> Iterator[Path]:
-        """Give a folder for the files of the table; the end of the ``with`` uploads them."""
+        """Yield a local folder for the files of the table.
+
+        The files are uploaded at the end of the ``with`` block.
+        """
         if self.folder is not None:
             yield self.folder
             return

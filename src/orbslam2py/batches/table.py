@@ -76,7 +76,7 @@ def printable(text: str) -> str:
     """Return a text that may contain file names in a form for every file and font."""
     try:
         return printable_name(text)
-    except UnicodeEncodeError:  # half of a character, which no byte of a name stands for
+    except UnicodeEncodeError:  # half of a character, which is no byte of a name
         return text.encode("utf-8", "replace").decode("utf-8")
 
 

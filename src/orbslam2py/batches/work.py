@@ -127,7 +127,7 @@ def _run(job: Job, path: Path, folder: Path, row: dict[str, Any], *, page: bool)
         sequence, options, output=folder, force=True, report_page=page, stop=threading.Event()
     )
     if done.result.interrupted:
-        raise KeyboardInterrupt  # it is half a run, which is made anew when the batch goes on
+        raise KeyboardInterrupt  # the batch repeats the run when it continues
     row |= _figures(done.report)
     row["state"] = "done"
     if done.result.error is not None:
@@ -187,7 +187,7 @@ def _figures(report: dict[str, Any]) -> dict[str, Any]:
 
 
 def _one_line(error: Exception) -> str:
-    # NumPy has an error of its own for too little memory, whose name says nothing to people.
+    # NumPy has its own error for too little memory; users may not know its name.
     text = describe_error(error) if isinstance(error, MemoryError) else error_entry(error)
     return " ".join((text or "").split())
 

@@ -24,7 +24,7 @@ def parse_board(
     dictionary: str | None = None,
     spacing: float | None = None,
 ) -> Target:
-    """Make a board of what a user gave.
+    """Make a board from the text of a user.
 
     Parameters
     ----------

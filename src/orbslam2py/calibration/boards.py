@@ -286,7 +286,7 @@ def _order_of_corners(points: FloatArray, tags: dict[int, FloatArray]) -> IntArr
 
 
 def _refined_tag(image: ByteArray, quad: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Refine the corners (4, 2) of a tag, and tell which of them were found."""
+    """Refine the corners (4, 2) of a tag; return also which of them were found."""
     side = float(np.linalg.norm(quad - np.roll(quad, 1, axis=0), axis=1).min())
     pixels = quad
     for part in _TAG_WINDOWS:

@@ -87,7 +87,7 @@ class BoardScene:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedScene:
-    """What the adjustment gives.
+    """Result of the adjustment.
 
     Attributes
     ----------
@@ -216,7 +216,7 @@ def adjust(
     scene
         Where to begin.
     sightings
-        What the cameras saw; every moment must be seen by a camera.
+        Observations of the cameras; every moment must be seen by a camera.
     free
         Names of the intrinsics to change; by default all.
     poses_alone

@@ -165,7 +165,7 @@ class Calibration:
         return angle_from_axis(self.camera, self.corners)
 
     def warnings(self) -> list[str]:
-        """Say what makes this calibration doubtful."""
+        """Return reasons to doubt this calibration."""
         found = []
         if len(self.views) < _GOOD_VIEWS:
             found.append(f"only {len(self.views)} different views; take {_GOOD_VIEWS} or more")
@@ -364,7 +364,7 @@ def enough_views(found: BoardViews, max_views: int) -> list[BoardView]:
 
 
 def sightings_of(views: list[BoardView], board: Target) -> list[Sighting]:
-    """The corners of views of one camera; each view is a moment of its own."""
+    """The corners of views of one camera; each view has its own time."""
     return [
         Sighting(0, moment, view.points_of(board), view.corners)
         for moment, view in enumerate(views)

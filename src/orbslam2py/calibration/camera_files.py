@@ -29,7 +29,7 @@ _RATE = 30.0
 
 
 class CameraFileFormat(str, Enum):
-    """Who wrote a calibration file; `orbslam2py.settings.foreign.FORMATS` describes them."""
+    """Formats of calibration files; `orbslam2py.settings.foreign.FORMATS` describes them."""
 
     AUTO = "auto"
     OPENCV = "opencv"
@@ -88,15 +88,15 @@ def read_camera_file(
     right
         ROS and EuRoC: the file of the right camera of a pair; `path` is the left one's.
     size
-        Width and height of the images [pixels], for a file that does not tell them, or that holds
-        calibrations of several sizes (ZED).
+        Width and height of the images [pixels], for a file that does not contain them, or that
+        holds calibrations of several sizes (ZED).
     sensor
         What the settings are for; by default a single camera or the pair, as the file is.
     baseline, depth_factor
         As for `orbslam2py.settings.settings_for_camera`. A pair has its baseline from the file;
         only if that is in another unit than metres, `baseline` replaces it.
     fps, n_features
-        Frames per second and ORB features per image. By default what the file tells, or 30 (KITTI:
+        Frames per second and ORB features per image. By default that of the file, or 30 (KITTI:
         10), and 1000 or, above 0.6 megapixels and for KITTI, 2000.
 
     Returns
@@ -322,7 +322,7 @@ def _settings_of(
 
 
 def _called(file: CameraFile, camera: ForeignCamera) -> str:
-    """What a camera is called in a sentence."""
+    """Name of a camera in messages."""
     if file.prefix is None:
         return "its camera"
     return f"{file.prefix}{camera.name}" if camera.name.isdecimal() else camera.name
@@ -357,7 +357,7 @@ def _with_baseline(path: Path, settings: Settings, baseline: float | None) -> Se
             )
         return settings
     if likely:
-        raise SettingsError(f"{path} tells the baseline, {found:.4g} m; leave --baseline out")
+        raise SettingsError(f"{path} contains the baseline, {found:.4g} m; leave --baseline out")
     if settings.right is not None:
         T = settings.right.T_left_right.copy()
         T[:3, 3] *= baseline / found

@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 #: Images of a video that are searched per second, if nothing else is said.
 _PER_SECOND = 4.0
-#: Views closer to a chosen one than this tell nothing new; see `_features`.
+#: Views closer to a chosen one than this add no information; see `_features`.
 _LEAST_DIFFERENCE = 0.03
 
 
@@ -152,7 +152,7 @@ class BoardView:
 
 @dataclass
 class BoardViews:
-    """What a search for the board in a folder or a video found.
+    """Result of a search for the board in a folder or a video.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ def find_board(image: ByteArray, board: Board) -> FloatArray | None:
     image
         uint8 (h, w), or (h, w, 3 or 4) in the order BGR.
     board
-        What to look for.
+        The board to search for.
 
     Returns
     -------
@@ -219,14 +219,14 @@ def find_views(
     every: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> BoardViews:
-    """Look for the board in a video or a folder of images.
+    """Search for the board in a video or a folder of images.
 
     Parameters
     ----------
     source
         Video file or folder.
     board
-        What to look for.
+        The board to search for.
     every
         Search every Nth image; by default all of a folder, four per second of a video.
     progress
@@ -275,7 +275,7 @@ def choose_views(found: BoardViews, most: int) -> list[BoardView]:
     Parameters
     ----------
     found
-        What the search found.
+        Result of the search.
     most
         How many at most.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What images say against a calibration, and what is likely behind it."""
+"""Evidence of images against a calibration, and its likely cause."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def find_pair_misfit(
     Parameters
     ----------
     rows : list of PairRows
-        What was measured, one entry or more.
+        The measurements, one entry or more.
     limits : FitThresholds
         The limits; more than half of the images must be beyond them.
     fisheye : bool
@@ -75,7 +75,7 @@ def find_data_misfit(
     whole : CalibrationGains, optional
         `calibration_gains` of all pairs.
     limits : FitThresholds
-        The limits. What all pairs say counts if each half of them says it, too.
+        The limits. A finding of all pairs counts if each half of the pairs has it, too.
     """
     if whole is None or whole.n_pairs < limits.least_pairs:
         return None
@@ -110,7 +110,7 @@ def _least_size(name: str, limits: FitThresholds) -> float:
 
 
 def _candidates(gains: CalibrationGains, limits: FitThresholds, with_depth: bool) -> list[str]:
-    # Epipolar lines alone hardly tell the principal point: motions explain it away.
+    # Epipolar lines alone hardly determine the principal point: motions explain it away.
     names = ("focal", "centre", "radial") if with_depth else ("focal", "radial")
     return [
         name

@@ -18,7 +18,7 @@ from orbslam2py.settings.camera_model import CameraModel
 PERSPECTIVE = ("pinhole", "radtan4", "radtan5", "rational")
 #: Lenses that may see 180 degrees, those that most programs read first.
 WIDE = ("kannala_brandt", "eucm", "double_sphere", "mei", "fov")
-#: Only calibrated if it is asked for: it takes many views to tell its 16 parameters.
+#: Only calibrated if it is asked for: many views are needed to determine its 16 parameters.
 FAMILIES = (*PERSPECTIVE, *WIDE, "thin_prism")
 #: Names of the number of coefficients of OpenCV's models.
 OPENCV_FAMILIES = (*PERSPECTIVE, "thin_prism")

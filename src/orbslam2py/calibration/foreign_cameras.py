@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the readers of all formats give: the cameras of a calibration file."""
+"""Result of the readers of all formats: the cameras of a calibration file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ForeignCamera:
     Attributes
     ----------
     name
-        What the file calls it.
+        Its name in the file.
     number
         What ``--camera`` calls it.
     K
@@ -36,14 +36,14 @@ class ForeignCamera:
         OpenCV's k1, k2, p1, p2, k3, (5,), with k4, k5, k6, (8,), and with s1 to s4, (12,). Other
         lenses: all 0.
     size
-        Width and height [pixels]; None if the file does not tell.
+        Width and height [pixels]; None if the file does not contain it.
     lens
         As `orbslam2py.calibration.lenses.lens_of` returns it.
     lens_numbers
         Parameters of a fisheye lens after fx, fy, cx, cy, as `orbslam2py.CameraModel` orders them.
     T_camera_rig
         Where it stands: from coordinates that all cameras of the file share (of the first one, or
-        of the IMU) to those of the camera, (4, 4), metres. None if the file does not tell.
+        of the IMU) to those of the camera, (4, 4), metres. None if the file does not contain it.
     R, P
         Rectification of a pair if the file has it: rotation (3, 3) from raw to rectified camera
         coordinates, and projection (3, 4), pixels.
@@ -63,7 +63,7 @@ class ForeignCamera:
 
 @dataclass(frozen=True, eq=False)
 class CameraFile:
-    """What a calibration file holds.
+    """Contents of a calibration file.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ class Pair:
     where
         The file or the files, for messages.
     file
-        What the file of the left camera holds.
+        Contents of the file of the left camera.
     left, right
         The cameras.
     alone
@@ -78,7 +78,7 @@ def pair_settings(pair: Pair, fps: float) -> Settings:
     Raises
     ------
     SettingsError
-        If the cameras do not make a pair, or the file does not tell how they stand.
+        If the cameras do not make a pair, or the file does not contain their relative pose.
     """
     if pair.file.rectified:
         return _rectified_pair(pair, fps)
@@ -134,7 +134,7 @@ def _rectified_pair(pair: Pair, fps: float) -> Settings:
     if bf <= 0:
         raise SettingsError(
             f"{pair.where}: {pair.right.name} does not stand to the right of {pair.left.name}; "
-            "give --camera with the left one of a pair"
+            "give --camera with the left camera of a pair"
         )
     width, height = pair.left.size or (None, None)
     camera = CameraSettings(
@@ -158,8 +158,8 @@ def _common_size(pair: Pair) -> tuple[int, int]:
         assert K is not None
         about = f"{round(2 * K[0, 2] + 1)}x{round(2 * K[1, 2] + 1)}"
         raise SettingsError(
-            f"{pair.where} does not tell the size of the images, which a pair needs; give it with "
-            f"--size WIDTHxHEIGHT (by the principal point about {about}), or {pair.alone}"
+            f"{pair.where} does not contain the size of the images, which a pair needs; give it "
+            f"with --size WIDTHxHEIGHT (by the principal point about {about}), or {pair.alone}"
         )
     if left != right:
         raise SettingsError(
@@ -222,8 +222,8 @@ def _require_side_by_side(pair: Pair, T: FloatArray) -> None:
     """Refuse a right camera that stands elsewhere, seen in the middle of both directions."""
     if not T[:3, 3].any():
         raise SettingsError(
-            f"{pair.where}: the pair cannot be rectified, because {pair.names} stand in one place, "
-            f"so they see no depth; look at {pair.file.place_key}, or {pair.alone}"
+            f"{pair.where}: the pair cannot be rectified, because {pair.names} have the same "
+            f"position, so they measure no depth; check {pair.file.place_key}, or {pair.alone}"
         )
     half = cv2.Rodrigues(np.asarray(cv2.Rodrigues(T[:3, :3])[0]) / -2)[0]
     x, y, z = (-np.asarray(half) @ T[:3, 3]).tolist()

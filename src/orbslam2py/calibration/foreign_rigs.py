@@ -31,8 +31,8 @@ def rig_settings(path: Path, file: CameraFile, fps: float) -> Settings:
     Raises
     ------
     SettingsError
-        If there are not two to eight cameras with supported lenses, or the file does not tell how
-        they are mounted or how large their images are.
+        If there are not two to eight cameras with supported lenses, or the file contains neither
+        their poses nor the sizes of their images.
     """
     if len(file.cameras) < 2:
         raise SettingsError(

@@ -59,7 +59,7 @@ def lens_of(where: str, what: str, name: object) -> str:
     Raises
     ------
     SettingsError
-        If nobody knows such a lens.
+        If the lens is unknown.
     """
     lens = fisheye_model(name) or _LENSES.get(plain_name(name))
     if lens is None:

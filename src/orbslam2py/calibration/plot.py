@@ -31,7 +31,7 @@ def draw_residuals(path: str | PathLike[str], calibration: Calibration, *, title
     Parameters
     ----------
     path
-        Where to write; the ending tells the format, and without one it is PNG.
+        Where to write; the suffix gives the format, PNG without one.
     calibration
         What to show.
     title

@@ -96,7 +96,7 @@ class RigCalibration:
         )
 
     def warnings(self) -> list[str]:
-        """Say what makes this calibration doubtful."""
+        """Return reasons to doubt this calibration."""
         found = []
         for number, camera in enumerate(self.cameras):
             found += [f"camera {number}: {text}" for text in camera.warnings()]

@@ -48,7 +48,7 @@ _HALVED = 6
 
 @dataclass(frozen=True)
 class Change:
-    """What a changed calibration explains better.
+    """A change of the calibration, and how much better it explains the points.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class CalibrationGains:
     residual
         Root of the mean robust cost with the calibration as it is, pixels.
     n_pairs, n_points
-        What was looked at.
+        Numbers of pairs and points used.
     focal, centre, radial
         The best change of only the focal length, the principal point, the distortion.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Points in pairs of images, the motions between them, and what these leave unexplained."""
+"""Points in pairs of images, the motions between them, and the residuals."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class State:
-    """A solution of a `Problem`, and what it leaves.
+    """A solution of a `Problem`, with its residuals.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ def _normalised(camera: CameraSettings, pixels: FloatArray) -> FloatArray:
 
 
 def begin(problem: Problem, changes: FloatArray) -> State:
-    """Find poses without knowing any, for a changed calibration."""
+    """Find poses without initial values, for a changed calibration."""
     n = len(problem.counts)
     R, t = np.repeat(np.eye(3)[None], n, axis=0), np.zeros((n, 3))
     if problem.depths is not None:
@@ -165,7 +165,7 @@ def _changed(rays: FloatArray, changes: FloatArray) -> _Rays:
 
 
 def residuals_of(problem: Problem, R: FloatArray, t: FloatArray, changes: FloatArray) -> FloatArray:
-    """Residuals (..., p, n, 1 or 2) in pixels of the images as they are, whatever the changes.
+    """Residuals (..., p, n, 1 or 2) in pixels of the given images, for any changes.
 
     Poses (..., p, 3, 3) and (..., p, 3): many at a time take hardly longer than one.
     """
@@ -190,7 +190,7 @@ def _sampson(first: _Rays, second: _Rays, R: FloatArray, t: FloatArray) -> Float
 
 
 def evaluate(problem: Problem, R: FloatArray, t: FloatArray, changes: FloatArray) -> State:
-    """Work out what poses and changes leave."""
+    """Compute the residuals of poses and changes."""
     residuals = residuals_of(problem, R, t, changes)
     costs = np.log1p((residuals**2).sum(axis=-1) / SCALE**2) * problem.counts
     return State(R, t, changes, residuals, float(costs.sum()) * SCALE**2)
@@ -224,7 +224,7 @@ def move(R: FloatArray, t: FloatArray, step: FloatArray) -> tuple[FloatArray, Fl
 
 
 def without_gross_errors(pair: PointPair, tolerance: float = 2.0) -> PointPair | None:
-    """Keep the points that agree with some geometry of two views, whatever the calibration.
+    """Keep the points that agree with a geometry of two views, for any calibration.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is said of a file that no format recognises: what was found in it, and what to do."""
+"""Message about a file that no format recognises: what was found in it, and what to do."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class Subcommand:
         return found
 
     def build(self, name: str) -> Any:
-        """The command as it is called."""
+        """Entry point of the command."""
         target = self.load()
         if not isinstance(target, typer.Typer):
             cls = None
@@ -258,9 +258,9 @@ def run_app() -> None:
     try:
         app()
     except (OrbSlamError, OSError) as error:
-        from orbslam2py._files import describe_error  # noqa: PLC0415  # loaded by now, or is slow
+        from orbslam2py._files import describe_error  # noqa: PLC0415  # already loaded, or slow
 
-        tell_repeated()  # warnings before what they led to
+        tell_repeated()  # warnings before their consequences
         print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)
     finally:

@@ -262,7 +262,7 @@ def import_camera(
     size: Annotated[
         str | None,
         typer.Option(
-            help="Size of the images, such as 640x480, if the file does not tell it or holds "
+            help="Size of the images, such as 640x480, if the file does not contain it or holds "
             "several (ZED).",
             metavar="WxH",
         ),

@@ -164,5 +164,5 @@ def _print(
     for fault in report.faults:
         console.print(f"[bold red]Fault ({fault.kind}):[/] {escape(fault.text)}")
     if report.fits:
-        checked = "" if not report.open_questions else ", as far as it could be checked"
+        checked = "" if not report.open_questions else ", within the limits of the check"
         console.print(f"[bold green]The IMU fits{checked}.[/]")

@@ -27,7 +27,7 @@ def outlive_the_reader() -> None:
     """Continue after the reader of standard output has closed it: files must still be written."""
     out = sys.stdout
     if out is not sys.__stdout__ or not isinstance(out, io.TextIOWrapper):
-        return  # somebody catches what is printed
+        return  # the output is captured
     if not stat.S_ISFIFO(os.fstat(out.fileno()).st_mode):
         return
     out.flush()

@@ -34,7 +34,7 @@ def show(
     meanings = descriptions()
     chosen = [(full, value) for full, value in all_values(Config()) if _is_of(full, name)]
     if not chosen:
-        value_of(Config(), str(name))  # raises, and says what is nearest
+        value_of(Config(), str(name))  # raises, and names the nearest one
         raise SettingsError(f"the configuration has no section {name}")
     console = Console()
     table = Table("name", "default", "meaning", show_lines=False)

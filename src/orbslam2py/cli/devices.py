@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``orbslam2py devices``: what is plugged in."""
+"""``orbslam2py devices``: connected devices."""
 
 from __future__ import annotations
 

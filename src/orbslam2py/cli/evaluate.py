@@ -108,9 +108,7 @@ def evaluate(
         Path | None,
         typer.Option(help="Write the figures to this file as well; earlier ones are replaced."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace whatever that file holds.")
-    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace that file.")] = False,
 ) -> None:
     """Compare a trajectory with ground truth: ATE, RPE and KITTI's segment errors.
 

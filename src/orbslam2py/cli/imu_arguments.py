@@ -23,7 +23,7 @@ def imu_settings_given(
     files
         Of ``--imu-settings``.
     chip
-        Name of the chip, for the noise that no file tells.
+        Name of the chip, for noise that is in no file.
 
     Raises
     ------

@@ -73,7 +73,7 @@ class EndingSignals:
 
 
 class _Request(threading.Event):
-    """An event that counts as set at once, even before the setting thread runs."""
+    """An event that reads as set immediately, even before the setting thread runs."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -65,7 +65,7 @@ def log_to(console: Console, *, quiet: bool) -> None:
     logger.handlers = [_ConsoleHandler(console)]
     logger.propagate = False
     logger.setLevel(logging.ERROR if quiet else logging.WARNING)
-    # What was guessed of the input is said as well, and on which networks a run is.
+    # Guesses about the input are shown as well, and the networks of a run.
     for room in ("datasets", "calibration.camera_files", "ros"):
         level = logging.ERROR if quiet else logging.INFO
         logging.getLogger(f"{logger.name}.{room}").setLevel(level)

@@ -38,8 +38,8 @@ PublishOption = Annotated[
 BaseFrameOption = Annotated[
     str | None,
     typer.Option(
-        help="Frame of the robot that is published; /tf_static or --base-transform tells where the "
-        "camera is in it [base_link].",
+        help="Frame of the robot that is published; /tf_static or --base-transform gives the pose "
+        "of the camera in it [base_link].",
         metavar="NAME",
     ),
 ]
@@ -66,8 +66,8 @@ FoxglovePort = Annotated[
 FoxgloveHost = Annotated[
     str | None,
     typer.Option(
-        help="Address for Foxglove's app [127.0.0.1: this computer only]. Whoever can reach "
-        "another one sees the images.",
+        help="Address for Foxglove's app [127.0.0.1: this computer only]. Everyone who can "
+        "reach another address sees the images.",
         metavar="ADDRESS",
     ),
 ]
@@ -75,7 +75,7 @@ FoxgloveHost = Annotated[
 
 @dataclass(frozen=True)
 class PublishOptions:
-    """What the command line says about publishing.
+    """Options of the command line for publishing.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def network_of(source: str, publish: str | None) -> str | None:
 
 @dataclass(frozen=True)
 class _Output:
-    """A connection, and what is published there."""
+    """A connection and its publishers."""
 
     transport: Transport
     base: BaseFrame
@@ -132,7 +132,7 @@ class Publishing:
     options
         Whether, and where to.
     sequence
-        What is run.
+        The sequence of the run.
     in_time
         Whether images come when they come: then some may be passed over.
     map_path
@@ -143,13 +143,13 @@ class Publishing:
     Attributes
     ----------
     sequence
-        What is to be run in its place: it notes the stamps of the images.
+        The sequence to run in its place: it notes the stamps of the images.
 
     Raises
     ------
     OrbSlamError
-        If a network cannot be reached, a file cannot be written, a package is missing, or nothing
-        tells where the camera is on the robot.
+        If a network cannot be reached, a file cannot be written, a package is missing, or the pose
+        of the camera on the robot is unknown.
     """
 
     def __init__(
@@ -192,7 +192,7 @@ class Publishing:
             transport = connect(options.network)
             self._outputs.append(_Output(transport, base, self._map_path))
             if topics is None or options.network != topics.name:
-                announce(transport)  # the topics have told where they come from
+                announce(transport)  # the topics have given the sender
         if options.foxglove:
             app = connect_foxglove(options.foxglove_host, options.foxglove_port)
             self._outputs.append(_Output(app, for_viewers(base), with_images=True))

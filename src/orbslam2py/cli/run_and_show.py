@@ -199,9 +199,7 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
         print_error(errors, "Error", problem)
     if result.error is not None:
         what = describe_error(result.error)
-        saved = (
-            "the other results are" if result.last_save_failed else "what was done until then is"
-        )
+        saved = "the other results are" if result.last_save_failed else "the results until then are"
         print_error(errors, "Error", f"{what} ({saved} saved)")
     if result.error is not None or done.problems:
         return ExitCode.FAILED

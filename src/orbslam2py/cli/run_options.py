@@ -21,12 +21,12 @@ SequenceArgument = Annotated[
         "ROS 1 or ROS 2 (.bag, .db3, .mcap, or its folder); video file; live source (ends with "
         "Ctrl-C): number of a camera, v4l:0, realsense:SERIAL, oak:ID, rtsp://HOST/PATH, topics of "
         "ROS 2 (ros2: or zenoh:). "
-        "'orbslam2py devices' lists what is plugged in."
+        "'orbslam2py devices' lists connected devices."
     ),
 ]
 SensorOption = Annotated[
     Sensor | None,
-    typer.Option(help="What the images come from [the richest there are images for]."),
+    typer.Option(help="Sensor of the images [the richest one that has images]."),
 ]
 SettingsOption = Annotated[
     str | None,
@@ -109,7 +109,7 @@ ImuNoiseOption = Annotated[
     str | None,
     typer.Option(
         "--imu-noise",
-        help="Name of the chip, such as bmi088, if the files do not tell the noise.",
+        help="Name of the chip, such as bmi088, if the files do not contain the noise.",
         metavar="CHIP",
     ),
 ]

@@ -46,7 +46,7 @@ OfSensor = Annotated[
 
 
 def new(
-    sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
+    sensor: Annotated[Sensor, typer.Option(help="Sensor of the images.")],
     fx: Annotated[float, typer.Option(help="Focal length in x [pixels].")],
     fy: Annotated[float, typer.Option(help="Focal length in y [pixels].")],
     cx: Annotated[float, typer.Option(help="Image centre in x [pixels].")],

@@ -104,8 +104,7 @@ def check_figures(path: Path | None, names: Collection[str], *, force: bool) -> 
         there = None
     if not isinstance(there, dict) or set(there) != set(names):
         raise OutputFileError(
-            f"{path} exists and holds something else than figures of this command; use --force to "
-            "replace it"
+            f"{path} exists and does not hold figures of this command; use --force to replace it"
         )
 
 

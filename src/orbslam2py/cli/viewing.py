@@ -37,8 +37,8 @@ ViewerPort = Annotated[
 ViewerHost = Annotated[
     str | None,
     typer.Option(
-        help="Address at which the page is served [127.0.0.1: to this computer only]. Whoever can "
-        "reach another one sees the images and can use the buttons.",
+        help="Address at which the page is served [127.0.0.1: to this computer only]. Everyone who "
+        "can reach another address sees the images and can use the buttons.",
         metavar="ADDRESS",
     ),
 ]

@@ -87,7 +87,7 @@ class Frame:
     text
         The time stamp in decimal seconds, with all digits of the source.
     images
-        What the camera saw, as the tracking calls take it.
+        Images of the frame, in the form of the tracking calls.
     read_imu
         Reads the samples for `imu`; None without an IMU.
     """
@@ -162,7 +162,7 @@ class FrameTimes:
     Attributes
     ----------
     exposure
-        Middle of the exposure of the (left) image; None if the device does not tell it.
+        Middle of the exposure of the (left) image; None if the device does not give it.
     arrival
         The first image of the frame came.
     complete
@@ -187,7 +187,8 @@ class LiveFrame(EqualByValue):
     Attributes
     ----------
     timestamp
-        Seconds since 1970 of the (left) image; grows from frame to frame whatever the clocks do.
+        Seconds since 1970 of the (left) image; grows from frame to frame, for any behaviour of the
+        clocks.
     text
         The time stamp in decimal seconds.
     images
@@ -199,7 +200,7 @@ class LiveFrame(EqualByValue):
     stamp
         Time of the (left) image on the clock of the device, seconds; None if it has no clock.
     times
-        When the frame passed its stages, for the latency; None if the source does not tell it.
+        When the frame passed its stages, for the latency; None if the source does not give it.
     """
 
     timestamp: float
@@ -216,7 +217,7 @@ class LiveSource(Source, Protocol):
     Attributes
     ----------
     n_dropped
-        Frames so far that were lost because nobody had taken them in time.
+        Number of frames that were lost so far because they were not read in time.
     """
 
     @property

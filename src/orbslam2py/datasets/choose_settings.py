@@ -10,7 +10,8 @@ from pathlib import Path
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings, builtin_settings, resolve_settings
 
-#: What a caller may give: settings, a file, a built-in name, or None to let the folder decide.
+#: Values that a caller may give: settings, a file, a built-in name, or None to let the folder
+#: decide.
 SettingsChoice = Settings | str | Path | None
 
 _SETTINGS_FILE = "settings.yaml"

@@ -183,8 +183,8 @@ def value_of(source: Path | str, text: str) -> Decimal:
 def unit_of(values: Sequence[Decimal], fps: float | None) -> int:
     """Return the digits of a second of the unit: 0 for seconds, 9 for nanoseconds.
 
-    The unit is that in which the usual step fits the frame rate. Images may be missing: long steps
-    count as seconds unless another unit fits far better.
+    The unit is chosen so that the usual step agrees with the frame rate. Images may be missing:
+    long steps count as seconds unless another unit fits far better.
     """
     largest = _largest(values)
     for digits, least in _SINCE_1970.items():

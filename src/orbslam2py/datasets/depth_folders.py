@@ -106,7 +106,7 @@ def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     if only_depth:
         has += "; all of them look like depth images (16 bits, one channel)"
     return DatasetError(
-        f"cannot tell which folder in {folder} has the images and which the depth: it has {has}; "
+        f"cannot decide which folder in {folder} has the images and which the depth: it has {has}; "
         "keep one folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, "
         f"or list the files in rgb.txt and depth.txt ('time path' in every line){alone}"
     )
@@ -141,9 +141,7 @@ class DepthFolders(UnlistedSequence):
     """
 
     layout = "images and depth"
-    _missing_calibration = (
-        "nothing tells what camera it is from; give --settings with a file or a built-in name"
-    )
+    _missing_calibration = "its camera is unknown; give --settings with a file or a built-in name"
 
     def __init__(
         self,

@@ -38,7 +38,7 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_eu
 
 _log = logging.getLogger(__name__)
 
-#: Images per second where no calibration tells them.
+#: Images per second if no calibration contains the rate.
 _USUAL_RATE = 20.0
 #: Names of images whose usual step is at most this are counts of frames and no times.
 _LARGEST_COUNT = 1000
@@ -116,7 +116,7 @@ class EurocSequence(RecordedSequence):
         if self.name == "mav0":
             self.name = folder.resolve().parent.name
         if self._chosen is not None and self._rectifies:
-            _ = self._rectification  # tells at once if the chosen settings have none
+            _ = self._rectification  # fails early if the chosen settings have none
         rate = self.known_rate() or _USUAL_RATE
         left = _list_images(root / "cam0", rate)
         kept = np.arange(len(left.paths))

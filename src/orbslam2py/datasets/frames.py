@@ -28,7 +28,7 @@ class ImuOfFrames:
     def _offset(self) -> float:
         try:
             settings = imu_settings_of(self._sequence)
-        except SettingsError:  # whoever uses them will say so
+        except SettingsError:  # the caller reports it
             return 0.0
         return 0.0 if settings is None else settings.time_offset
 

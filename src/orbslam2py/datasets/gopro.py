@@ -56,8 +56,8 @@ def read_gopro_imu(path: str | Path) -> ImuSamples | None:
     """Read the samples of gyro and accelerometer of a GoPro video.
 
     The times begin with the first image, as those of the images do. Axes are put in the order x, y,
-    z if the video tells their order (``ORIN``, since HERO6); else a warning says that they are as
-    recorded. The accelerometer is interpolated at the times of the gyro.
+    z if the video contains their order (``ORIN``, since HERO6); else a warning says that they are
+    as recorded. The accelerometer is interpolated at the times of the gyro.
 
     Parameters
     ----------
@@ -99,8 +99,8 @@ def read_gopro_imu(path: str | Path) -> ImuSamples | None:
         return None
     if not ordered:
         _log.warning(
-            "%s does not tell the order of the axes of its IMU; they are as recorded: see which "
-            "fit with 'orbslam2py check-imu'",
+            "%s does not contain the order of the axes of its IMU; they are used as recorded: "
+            "check them with 'orbslam2py check-imu'",
             path,
         )
     gyro, accel = (np.concatenate(streams[name]) for name in (b"GYRO", b"ACCL"))

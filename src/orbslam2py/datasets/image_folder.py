@@ -53,7 +53,7 @@ def image_files(folder: Path) -> list[Path]:
         If the folder cannot be listed.
     """
     try:
-        with os.scandir(folder) as entries:  # tells folders without a look at every file
+        with os.scandir(folder) as entries:  # distinguishes folders without a stat of every file
             names = [
                 entry.name
                 for entry in entries

@@ -154,7 +154,7 @@ def read_depth(path: Path) -> NDArray[np.generic]:
 
 
 def read_any(path: Path) -> NDArray[np.generic]:
-    """Read an image of any depth and number of channels as it is.
+    """Read an image of any depth and number of channels, unconverted.
 
     Raises
     ------
@@ -199,7 +199,7 @@ def decode_any(content: bytes, what: object) -> NDArray[np.generic]:
     plain = core.decode_png(content)
     if plain is not None:
         return np.asarray(plain)
-    # Some versions of OpenCV fill the rest of a truncated image with grey and say nothing.
+    # Some versions of OpenCV fill the rest of a truncated image with grey, without an error.
     for begin, end in ((_PNG, _PNG_END), (_JPEG, _JPEG_END)):
         if content.startswith(begin) and end not in content[-_TAIL:]:
             raise ImageError(f"image {what} is truncated ({len(content)} bytes)")

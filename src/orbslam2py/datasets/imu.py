@@ -51,7 +51,7 @@ def imu_of(sequence: object) -> ImuSamples | None:
 
 
 def imu_settings_of(sequence: object) -> ImuSettings | None:
-    """Read what comes with a sequence about its IMU; None if nothing does.
+    """Read the IMU data that come with a sequence; None if nothing does.
 
     Raises
     ------

@@ -64,7 +64,7 @@ _UNIT = re.compile(r"[\[(](?P<unit>[^\])]*)[\])]")
 _DEGREES = re.compile(r"deg|\u00b0|dps", re.IGNORECASE)
 _GRAVITIES = re.compile(r"\s*g(rav\w*)?\s*'?s?\s*", re.IGNORECASE)
 
-#: Steps between samples in seconds, by which the unit of the times is told.
+#: Steps between samples in seconds, from which the unit of the times is guessed.
 _LONGEST_STEP, _SHORTEST_STEP = 0.11, 1e-4
 _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
@@ -74,7 +74,7 @@ _Unit = TypeVar("_Unit", GyroUnit, AccelUnit)
 
 @dataclass(frozen=True)
 class _Columns:
-    """Places of time, gyro and accelerometer, and the units that the header tells."""
+    """Columns of time, gyro and accelerometer, and the units in the header."""
 
     places: tuple[int, ...]
     gyro: GyroUnit | None = None
@@ -149,7 +149,7 @@ def read_table(path: Path, columns: int = 7) -> Table:
 
 
 def unit_in(header: str, kind: type[_Unit]) -> _Unit | None:
-    """Tell the unit that stands in brackets in a header, if it is not the usual one."""
+    """Return the unit in brackets of a header, if it is not the usual one."""
     units = [match["unit"] for match in _UNIT.finditer(header)]
     if kind is GyroUnit and any(_DEGREES.search(unit) for unit in units):
         return kind("deg/s")
@@ -172,14 +172,14 @@ def read_imu_csv(
         Values separated by commas, semicolons or blanks. A header names the columns, such as
         ``timestamp,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z``, with units in brackets if they
         are not rad/s and m/s^2: ``gyro_x [deg/s]``, ``accel_x [g]``. Without a header the columns
-        stand in this order. Times may be in s, ms, us or ns, which their step tells.
+        stand in this order. Times may be in s, ms, us or ns; the unit follows from their step.
     gyro_unit, accel_unit
         Units of the readings; by default those of the header, else rad/s and m/s^2.
 
     Raises
     ------
     DatasetError
-        Naming the file, the line and what is wrong there.
+        Naming the file, the line and the fault.
     """
     path = Path(path)
     table = read_table(path)

@@ -51,7 +51,7 @@ def read_imu_streams(
     Raises
     ------
     DatasetError
-        Naming the file, the line and what is wrong there.
+        Naming the file, the line and the fault.
     """
     streams: dict[str, FloatArray] = {}
     for path in map(Path, (first, second)):
@@ -80,7 +80,7 @@ def _kind(path: Path, table: Table) -> str:
         if is_gyro != is_accel:
             return "gyro" if is_gyro else "accelerometer"
     raise DatasetError(
-        f"{path}: neither its header nor its name tells whether it is of the gyro or the "
+        f"{path}: neither its header nor its name says whether it is of the gyro or the "
         "accelerometer; name the file gyro.csv or accelerometer.csv"
     )
 

@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 #: Numbers of the left and the right camera of the grey pair, which comes first, and the colour one.
 _PAIRS = ((0, 1), (2, 3))
 
-#: Which built-in settings there are, and the last sequence that they tell by number.
+#: Names of the built-in settings, and the last sequence whose number selects one.
 _ALL_BUILT_IN = "kitti00-02, kitti03 or kitti04-12, by the number of the sequence"
 _LAST_NUMBERED = 12
 

@@ -165,7 +165,7 @@ def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
 
 #: Attributes that not every sequence has: where its files are.
 _OF_SOME = frozenset({"path", "folder", "image_path"})
-#: Attributes that not every live source has: its device, IMU, losses, and whoever records it.
+#: Attributes that not every live source has: its device, IMU, losses, and recorder.
 _OF_LIVE = frozenset(
     {"device", "has_imu", "imu_settings", "doubts", "counts", "set_tap", "is_split"}
 )
@@ -245,11 +245,11 @@ class MaskedSequence(FramesInOrder, _Masked):
         return imu_of(self._sequence)
 
     def imu_settings(self) -> ImuSettings | None:
-        """Read what comes with the sequence about its IMU; None if nothing does."""
+        """Read the IMU data that come with the sequence; None if nothing does."""
         return imu_settings_of(self._sequence)
 
     def __getattr__(self, name: str) -> Any:
-        # What only some sequences tell: `path` or `folder`, and `image_path`.
+        # Attributes that only some sequences have: `path` or `folder`, and `image_path`.
         if name in _OF_SOME:
             return getattr(self._sequence, name)
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")

@@ -12,7 +12,7 @@ from pathlib import Path
 _SIDES = (("left", "right"), ("l", "r"), ("0", "1"), ("1", "2"), ("2", "3"))
 #: Words (also those of ``cameraLeft``), numbers, and what stands between them.
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^A-Za-z0-9]+")
-#: A number tells the camera, and not the recording, in names such as ``cam0`` or ``image_02``.
+#: In names such as ``cam0`` or ``image_02`` the number is that of the camera, not of the recording.
 _CAMERA = re.compile(
     r"(?<![a-z])(c|cam|camera|images?|img|infra|ir|rgb|colou?r|gr[ae]y|mono|fisheye)[^a-z0-9]*\d",
     re.IGNORECASE,

@@ -31,7 +31,7 @@ class Preparation:
     name
         Name of the source for messages.
     sensor
-        What the images are for.
+        Sensor for which the images are used.
     settings
         Order of the colours, size and rectification.
     split

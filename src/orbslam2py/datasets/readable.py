@@ -51,7 +51,7 @@ READABLE_LAYOUTS = (
     ReadableLayout(
         "KITTI raw",
         "mono, stereo",
-        "A drive as it is unpacked, with the calibration in the folder of its day.",
+        "An unpacked drive, with the calibration in the folder of its day.",
         "2011_09_26/2011_09_26_drive_0001_sync/image_00/data  2011_09_26/calib_cam_to_cam.txt",
         (Layout.KITTI_RAW,),
     ),
@@ -158,7 +158,7 @@ class ReadableImu:
     name
         Whose they are.
     description
-        What is read.
+        One line about the data that are read.
     example
         Files or lines of it.
     """
@@ -193,7 +193,7 @@ READABLE_SAMPLES = (
     ),
     ReadableImu(
         "GoPro",
-        "The track GPMF of the MP4 file; axes in the order that `ORIN` tells.",
+        "The track GPMF of the MP4 file; axes in the order of `ORIN`.",
         "GX010001.MP4",
     ),
     ReadableImu(

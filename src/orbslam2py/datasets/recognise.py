@@ -67,7 +67,7 @@ def recognise(folder: str | Path) -> Layout | str:
         raise _several(folder, list(map(str, found)))
     if found:
         return found[0]
-    message = f"{folder} is no sequence we know: looked for {_MARKS}"
+    message = f"{folder} is no known sequence: looked for {_MARKS}"
     inner = sorted(child for child in folder.iterdir() if child.is_dir() and _layouts(child))
     if inner:
         message += f"; did you mean {inner[0]}?"
@@ -82,7 +82,7 @@ def has_layout(folder: Path) -> bool:
 
 
 def is_depth_pair(folder: Path, sensor: Sensor | str | None) -> bool:
-    """Tell whether a folder has no layout, but a folder of images and a folder of depth.
+    """Return whether a folder has no known layout, but a folder of images and a folder of depth.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def _several(folder: Path, names: list[str]) -> DatasetError:
 
 
 def _layouts(folder: Path) -> list[Layout | str]:
-    # What has marks of its own goes before what has only lists as TUM's.
+    # Layouts with unmistakable files come before layouts that only have lists like TUM's.
     special = find_loaders(folder)
     known = {str(layout) for layout in Layout}
     found: list[Layout | str] = [Layout(name) if name in known else name for name in special]

@@ -68,7 +68,8 @@ class RecordedSequence(FramesInOrder, ABC):
     """
 
     layout: str
-    #: Direction of up in the world of the ground truth, (3,); None if the layout does not tell it.
+    #: Direction of up in the world of the ground truth, (3,); None if the layout does not contain
+    #: it.
     up_in_truth: FloatArray | None = None
     #: Why there are no settings if none were found, and which of the built-in ones to give.
     _missing_calibration: str
@@ -86,7 +87,7 @@ class RecordedSequence(FramesInOrder, ABC):
         self.sensor = choose_sensor(folder, sensor, available)
         self._chosen = None if settings is None else resolve_settings(settings, self.sensor)
         self._stamps = Stamps(np.zeros(0), (), ())
-        #: What tells the images, for messages.
+        #: Source of the list of images, for messages.
         self._list_path = folder
         self._grey_scale = GreyScale(folder, self._sample)
 
@@ -102,7 +103,7 @@ class RecordedSequence(FramesInOrder, ABC):
 
     @cached_property
     def _default_settings(self) -> Settings:
-        # Read once: a file tells its doubts whenever it is read.
+        # Read once: a file reports its doubts whenever it is read.
         return choose_settings(
             self.sensor, self._settings_folders(), self._from_calibration, self._missing_calibration
         )
@@ -233,7 +234,7 @@ class RecordedSequence(FramesInOrder, ABC):
 
 
 def _found_instead(folder: Path, missing: Path) -> str:
-    """Return what the folder contains instead, or else where the image is."""
+    """Return other images in the folder, or otherwise the place of the image."""
     if missing.parent.is_dir():
         names = [p.name for p in missing.parent.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
         return f" (there is {missing.parent / min(names)})" if names else ""

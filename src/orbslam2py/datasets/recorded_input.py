@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From what a user names to recorded images: a folder, a bag or a video."""
+"""Opens recorded images by the name that a user gives: a folder, a bag or a video."""
 
 from __future__ import annotations
 

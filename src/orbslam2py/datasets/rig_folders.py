@@ -30,7 +30,7 @@ _log = logging.getLogger(__name__)
 _NUMBER = re.compile(r"^(?P<name>.*?)(?P<number>\d+)$")
 #: Differences of the stamps of one moment that are worth a warning [s].
 _APART = 1e-3
-#: What a rig looks like, for messages.
+#: Layout of a rig, for messages.
 A_RIG = (
     "a rig is a folder with one folder of images for each camera, in the order of the settings: "
     "cam0, cam1, ... (or mav0/cam0/data, ...), and depth0, ... for cameras with depth images; the "
@@ -79,7 +79,7 @@ class RigFolders(UnlistedSequence):
 
     layout = "images of a rig"
     _missing_calibration = (
-        "nothing tells how the cameras are mounted; give --settings with the file of a rig"
+        "the poses of its cameras are unknown; give --settings with the file of a rig"
     )
 
     def __init__(

@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 #: Least share of the smaller series that must have a partner of the same name or number.
 _COMMON = 0.5
-#: What a pair looks like, for messages.
+#: Layout of a pair, for messages.
 A_PAIR = (
     "a pair is two folders of images, such as left and right or cam0 and cam1, or two series in "
     "one folder, such as left_0000.png and right_0000.png; for images that hold both views side "
@@ -103,7 +103,7 @@ def no_pair(folder: Path) -> DatasetError:
     if files:
         return DatasetError(
             f"{folder} has no stereo images: the names of its {len(files)} images "
-            f"({files[0].name} ...) tell no left and right; {A_PAIR}"
+            f"({files[0].name} ...) do not name left and right; {A_PAIR}"
         )
     has = ", ".join(map(str, folder_kinds(folder))) or "no images"
     return DatasetError(f"{folder} has no stereo images: it has {has}; {A_PAIR}")
@@ -142,7 +142,7 @@ class StereoFolders(UnlistedSequence):
 
     layout = "images of a pair"
     _missing_calibration = (
-        "nothing tells what cameras they are from; give --settings with a file or a built-in name"
+        "their cameras are unknown; give --settings with a file or a built-in name"
     )
 
     def __init__(

@@ -24,7 +24,7 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_tu
 
 _log = logging.getLogger(__name__)
 
-#: Names under which an association file is looked for, the first that is there counts.
+#: Possible names of an association file; the first existing one is used.
 ASSOCIATION_NAMES = ("associations.txt", "association.txt", "associate.txt", "assoc.txt")
 
 
@@ -70,8 +70,8 @@ class TumSequence(RecordedSequence):
     layout = Layout.TUM
     up_in_truth = np.array([0.0, 0.0, 1.0])  # the motion capture system stands upright
     _missing_calibration = (
-        "its name does not tell the camera; for TUM RGB-D give --settings tum1 (if the sequence "
-        "was named freiburg1 there), tum2 (freiburg2) or tum3 (freiburg3)"
+        "its name does not identify the camera; for TUM RGB-D give --settings tum1 (if the "
+        "sequence was named freiburg1 there), tum2 (freiburg2) or tum3 (freiburg3)"
     )
 
     def __init__(

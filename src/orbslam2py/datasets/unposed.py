@@ -71,7 +71,7 @@ class UnposedSource:
         return None
 
     def _delivered(self, image: NDArray[np.generic]) -> Images:
-        """Make what is tracked of OpenCV's image: halves, colour order, rectification.
+        """Convert OpenCV's image for tracking: halves, colour order, rectification.
 
         Raises
         ------
@@ -88,9 +88,9 @@ class UnposedSource:
 
 
 def no_settings(what: object) -> SettingsError:
-    """Say that nothing tells what camera images are from, and what to do about it."""
+    """Report that the camera of the images is unknown, with the remedy."""
     return SettingsError(
-        f"no settings for {what}: nothing tells what camera it is from. Give --settings "
+        f"no settings for {what}: its camera is unknown. Give --settings "
         f"with a file or a built-in name ({', '.join(BUILTIN_NAMES)}). Make a file with "
         "'orbslam2py settings new' from the numbers of the camera, with 'orbslam2py "
         "calibrate' from images of a chessboard, or with 'orbslam2py import-camera' from a "

@@ -57,7 +57,7 @@ class VideoReader:
             raise DatasetError(f"video {self.path} does not exist; check the path")
         self._capture = self._open()
         self._next = 0
-        #: Frames per second as the file tells; 0 if it does not.
+        #: Frames per second in the file; 0 if it does not.
         self.fps = _rate(self._capture)
 
     def scan(self) -> FloatArray:
@@ -286,7 +286,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
             return stamps_of_seconds(seconds)
         if not self._reader.fps:
             raise DatasetError(
-                f"video {self.path} tells neither time stamps nor a frame rate; give --fps"
+                f"video {self.path} contains neither time stamps nor a frame rate; give --fps"
             )
         _log.warning(
             "the time stamps of %s do not grow; taking a constant %g frames per second",

@@ -110,7 +110,7 @@ def fit_by_time(
     with_scale
         The worlds may differ in their unit.
     fewest
-        Poses at the same times (0.02 s) that tell how the paths lie to each other.
+        Poses at the same times (0.02 s) for the alignment of the paths.
 
     Returns
     -------

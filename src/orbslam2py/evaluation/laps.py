@@ -140,7 +140,7 @@ def _lap(
     truth = truth.select(~truth.lost)
     truth = truth.select(time_order(truth))
     i, j = match_poses(estimate, truth, max_difference)
-    # Along all true poses: the way also goes on where the estimate has gaps.
+    # Along all true poses: the path length also counts gaps of the estimate.
     along = lengths_along(truth.positions)[j]
     along -= along[0]
     n = len(along)

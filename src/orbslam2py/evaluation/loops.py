@@ -15,7 +15,7 @@ from orbslam2py.evaluation.matching import match_poses, time_order
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, align, lengths_along
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
-# How far the truth may be from what a true loop says.
+# Largest difference between the ground truth and the measurement of a true loop.
 _TOLERANCE_METRES = 0.3
 _TOLERANCE_OF_DISTANCE = 0.02
 _TOLERANCE_DEGREES = 10.0

@@ -297,7 +297,7 @@ def _by_frame_number(estimate: Poses, truth: Poses) -> Paired:
         )
     known = frames.indices < n
     rows = Trajectory(frames.timestamps[known], truth.trajectory.T_wc[frames.indices[known]])
-    by = "number of the frame, as frames.csv tells it"
+    by = "number of the frame, as in frames.csv"
     return Paired(estimate.trajectory, rows, by, on_clocks=False)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Samples of an IMU: their array, and what was wrong with them."""
+"""Samples of an IMU: their array, and their faults."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ImuSamples(EqualByValue):
         Rows ``[t, gx, gy, gz, ax, ay, az]``, float64 (n, 7), read-only: seconds, growing; angular
         rate [rad/s]; specific force [m/s^2], which points up at rest.
     doubts
-        What was changed in them, one sentence each; these were logged as warnings.
+        Changes made to them, one sentence each; these were logged as warnings.
     """
 
     source: str
@@ -154,7 +154,7 @@ def clean_rows(data: FloatArray) -> Cleaned:
 
 
 def make_samples(source: str, data: FloatArray) -> ImuSamples:
-    """Sort samples, leave out what is not finite or doubled, and log how many these were.
+    """Sort samples, leave out those that are not finite or repeated, and log their number.
 
     Parameters
     ----------

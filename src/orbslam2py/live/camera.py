@@ -76,7 +76,7 @@ class LiveCamera(LiveStream):
 
 
 def requested_size(settings: Settings | None, *, split: bool) -> tuple[int, int] | None:
-    """Return the size of the images that fit settings; None if they do not tell it."""
+    """Return the size of the images that fit settings; None if they do not give it."""
     if settings is None or settings.camera.width is None or settings.camera.height is None:
         return None
     return (1 + split) * settings.camera.width, settings.camera.height

@@ -30,7 +30,7 @@ _PATIENCE = 2.0
 
 
 class Capture(Protocol):
-    """What is used of ``cv2.VideoCapture``; ``get`` need not be there."""
+    """The used part of ``cv2.VideoCapture``; ``get`` need not be there."""
 
     def isOpened(self) -> bool: ...  # noqa: D102
     def set(self, prop: int, value: float, /) -> bool: ...  # noqa: D102
@@ -79,7 +79,7 @@ class CaptureDevice:
         self._thread: threading.Thread | None = None
 
     def settings(self) -> Settings | None:
-        """Return None: such a camera tells no calibration."""
+        """Return None: such a camera gives no calibration."""
         return None
 
     def imu_settings(self) -> ImuSettings | None:
@@ -103,7 +103,7 @@ class CaptureDevice:
             capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._request.size[1])
         if self._request.fps is not None:
             capture.set(cv2.CAP_PROP_FPS, self._request.fps)
-        # An event of each thread: one that hangs must not go on when the next one begins.
+        # An event of each thread: one that hangs must not continue when the next one begins.
         self._stop = threading.Event()
         self._thread = threading.Thread(
             target=self._run, args=(capture, sink, self._stop), name="camera", daemon=True
@@ -144,7 +144,7 @@ class CaptureDevice:
             stop.wait(_PAUSE)
 
     def _driver_time(self, capture: Capture, now: float) -> float | None:
-        """When the driver got the image; None if it does not tell it on the monotonic clock."""
+        """When the driver got the image; None if it does not give it on the monotonic clock."""
         if not self._has_driver_times:
             return None
         told = float(cast(Any, capture).get(cv2.CAP_PROP_POS_MSEC)) / 1e3
@@ -223,7 +223,7 @@ def open_device(request: Request) -> CaptureDevice:
     Raises
     ------
     DatasetError
-        If the address is none.
+        If the address is invalid.
     """
     address = request.address
     if "://" in address:
@@ -266,7 +266,7 @@ def _network_camera(url: str, request: Request) -> CaptureDevice:
         lambda: cv2.VideoCapture(url, cv2.CAP_FFMPEG, timeouts),
         lambda: (
             f"{shown} cannot be opened; see whether the camera is on, whether a player such as "
-            "VLC opens the address, and whether it wants a name and a password: "
+            "VLC opens the address, and whether it needs a name and a password: "
             "rtsp://NAME:PASSWORD@HOST/PATH"
         ),
         request,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From stamps of a device to times that grow, whatever the device's clock does."""
+"""Converts stamps of a device into growing times, for any behaviour of its clock."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LEAST_STEP = 1e-3
 
 @dataclass
 class _Stream:
-    """The last stamp of a stream, and what became of it."""
+    """The last stamp of a stream, and its converted time."""
 
     stamp: float
     time: float
@@ -40,7 +40,7 @@ class DeviceClock:
 
     The clock of the device counts, shifted to the clock of this computer unless it gives seconds
     since 1970 itself. When it jumps, back or more than `JUMP` ahead, the shift changes so that
-    times go on by the clock of this computer. All streams share the shifts: images that belong
+    times continue by the clock of this computer. All streams share the shifts: images that belong
     together stay together.
 
     Parameters
@@ -71,7 +71,7 @@ class DeviceClock:
         self.n_late: dict[str, int] = {}
 
     def restart(self) -> None:
-        """Expect that the clock of the device begins anew: it was started again."""
+        """Expect that the clock of the device starts again: it was started again."""
         self._lead = -np.inf
         for stream in self._streams.values():
             stream.restarted = True
@@ -155,7 +155,7 @@ class DeviceClock:
             jump = stamp + self._shifts[last.epoch] - expected
             direction = "ahead" if jump > 0 else "back"
             self._report(
-                f"has a clock that jumped {direction} by {abs(jump):.3g} s; the times go on "
+                f"has a clock that jumped {direction} by {abs(jump):.3g} s; the times continue "
                 "without the jump"
             )
         self._shifts.append(expected - stamp)

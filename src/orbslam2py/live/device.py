@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings import ImuSettings, Sensor, Settings
 
-#: What a device may deliver: images of one camera; the left and the right image of a pair; depth
+#: Streams of a device: images of one camera; the left and the right image of a pair; depth
 #: registered to `image`; samples of an IMU.
 Stream = Literal["image", "left", "right", "depth", "imu"]
 
 
 class Sink(Protocol):
-    """Where a device delivers to. All calls return at once and may come from any thread."""
+    """Where a device delivers to. No call blocks. Calls may come from any thread."""
 
     def image(
         self,
@@ -44,7 +44,7 @@ class Sink(Protocol):
             ``image``, ``left``, ``right`` or ``depth``.
         array
             Grey (h, w) or colour in the order BGR (h, w, 3), uint8 or uint16; depth (h, w), uint16
-            or float32. The sink keeps the array: give one that nobody writes to any more. Raw
+            or float32. The sink keeps the array: pass an array that is not written to any more. Raw
             images of a pair are rectified later, if the settings say how.
         stamp
             Time of the image on the clock of the device, seconds. All streams of a device, the IMU
@@ -67,7 +67,7 @@ class Sink(Protocol):
         ...
 
     def gyro(self, samples: FloatArray, /) -> None:
-        """Deliver angular rates of a gyro with a clock beat of its own; see `accel`.
+        """Deliver angular rates of a gyro that has its own sample times; see `accel`.
 
         Parameters
         ----------
@@ -111,7 +111,8 @@ class Device(Protocol):
     kind
         Prefix of the source, the layout of its frames: ``realsense``.
     streams
-        What it will deliver. Images of a frame are complete when each of these has come.
+        The streams that it will deliver. Images of a frame are complete when each of these has
+        come.
     """
 
     @property
@@ -162,15 +163,15 @@ class Device(Protocol):
 
 @dataclass(frozen=True)
 class Request:
-    """What a user asks a kind of device for.
+    """Request of a user to a kind of device.
 
     Attributes
     ----------
     address
-        What stands behind the prefix of the source, such as a serial number; empty for the first
+        The part after the prefix of the source, such as a serial number; empty for the first
         device. Of ``rtsp://host/path`` all of it.
     sensor
-        What the images are needed for; None for the richest that the device can do.
+        Sensor for which the images are used; None for the richest that the device can do.
     imu
         Whether samples of the IMU are wanted.
     fps
@@ -203,7 +204,7 @@ class FoundDevice:
     description
         Name of the product.
     modes
-        What it can deliver, a line each: ``infrared 848 x 480, 30 fps``.
+        Modes that it can deliver, a line each: ``infrared 848 x 480, 30 fps``.
     """
 
     source: str

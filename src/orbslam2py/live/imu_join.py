@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Samples of an IMU as they come, and which of them belong to a frame."""
+"""Assigns arriving samples of an IMU to frames."""
 
 from __future__ import annotations
 

@@ -28,12 +28,12 @@ Tap = Callable[[Parts | None, FloatArray | None], None]
 
 
 class Inlet:
-    """Takes what a device delivers, in its threads; see `device.Sink`.
+    """Receives the data of a device, in its threads; see `device.Sink`.
 
     Parameters
     ----------
     streams
-        What the device delivers.
+        The streams of the device.
     max_skew
         Largest time between the images of one moment, seconds.
     rate
@@ -134,12 +134,12 @@ class Inlet:
                 self.changed.notify_all()
 
     def warning(self, text: str, /) -> None:
-        """Report what the device says."""
+        """Report a message of the device."""
         self._reports.warn(text, text)
 
     # ---- called by the stream --------------------------------------------------------------------
     def begin(self) -> None:
-        """Take what comes from now on; what came before is nothing that was lost."""
+        """Accept data from now on; earlier data do not count as lost."""
         with self.changed:
             self._closed = False
 

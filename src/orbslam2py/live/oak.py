@@ -26,7 +26,7 @@ from orbslam2py.live.oak_calibration import (
 from orbslam2py.live.usb import find_usb
 from orbslam2py.settings import ImuSettings, Sensor, Settings
 
-#: Size and rate that are taken if nobody asks for others: all OAK-D cameras have them.
+#: Default size and rate: all OAK-D cameras have them.
 _SIZE, _RATE = (640, 400), 30.0
 #: Samples of the IMU per second, and how many come together at most.
 _IMU_RATE, _IMU_BATCH = 200, 10
@@ -71,11 +71,11 @@ class Oak:
     name
         Name for messages.
     kind_of_images
-        What the images are for.
+        Sensor for which the images are used.
     request
         Size, rate, and whether the IMU is wanted.
     make
-        Makes the pipeline, each time anew.
+        Makes a new pipeline at each call.
     read_calibration
         Returns the ``depthai.CalibrationHandler`` of the camera.
     """
@@ -101,7 +101,7 @@ class Oak:
 
     @property
     def streams(self) -> tuple[Stream, ...]:
-        """What it will deliver."""
+        """The streams that it will deliver."""
         streams: dict[Sensor, tuple[Stream, ...]] = {
             Sensor.STEREO: ("left", "right"),
             Sensor.RGBD: ("image", "depth"),
@@ -232,7 +232,7 @@ def camera_pipeline(pipeline: Any, device: Any, kind: Sensor, request: Request) 
     pipeline, device
         Those of the library.
     kind
-        What the images are for.
+        Sensor for which the images are used.
     request
         Size, rate, and whether the IMU is wanted.
     """
@@ -313,7 +313,7 @@ def _information(name: str, address: str) -> Any:
         )
     raise DatasetError(
         f"{name} is not there: no OAK camera is plugged in or in the network; plug it into a USB 3 "
-        "port; 'orbslam2py devices' lists what is found"
+        "port; 'orbslam2py devices' lists connected cameras"
     )
 
 
@@ -325,7 +325,7 @@ def _connected(name: str, address: str) -> Any:
 
 
 def _problem(name: str, text: str) -> str:
-    """Say what an error of the library means to the user."""
+    """Explain an error of the library to the user."""
     low = text.lower()
     if "already" in low or "in use" in low or "busy" in low:
         return f"{name} is in use by another program; close it ({text})"

@@ -73,13 +73,13 @@ def settings_of(
         else:
             left = _info(calibration, name, LEFT, size)
             settings = settings_of_camera(left, kind, fps, rectified=False, depth_factor=None)
-    except RuntimeError as error:  # what the library raises if the memory of the camera is empty
-        raise DatasetError(f"{name} tells no calibration ({error}); {_ADVICE}") from error
+    except RuntimeError as error:  # error of the library if the memory of the camera is empty
+        raise DatasetError(f"{name} has no calibration ({error}); {_ADVICE}") from error
     return replace(settings, camera=replace(settings.camera, rgb=False))
 
 
 def imu_settings_of(calibration: Any, kind: Sensor, rate: float) -> ImuSettings | None:
-    """Return where the IMU is, with the usual noise; None if the camera does not tell it."""
+    """Return where the IMU is, with the usual noise; None if the camera does not give it."""
     socket = COLOUR if kind is Sensor.RGBD else LEFT
     try:
         T = calibration.getImuToCameraExtrinsics(socket, False, dai.LengthUnit.METER)
@@ -123,5 +123,5 @@ def _info(
     )
     info = CameraInfo.of(message, what)
     if info is None:
-        raise DatasetError(f"{what} tells no calibration; {_ADVICE}")
+        raise DatasetError(f"{what} has no calibration; {_ADVICE}")
     return info

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From what a user names to images: a live source, or something recorded."""
+"""Opens images by the name that a user gives: a live source, or something recorded."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def open_source(
     ----------
     source
         A live source: ``realsense:`` or ``realsense:SERIAL``, ``oak:`` or ``oak:ID``, ``v4l:0``,
-        ``rtsp://HOST/PATH``, ``ros2:``, ``zenoh:``, the number of a camera (also as text); or
-        whatever `orbslam2py.datasets.open_recorded` opens. A file of that name goes first.
+        ``rtsp://HOST/PATH``, ``ros2:``, ``zenoh:``, the number of a camera (also as text); or any
+        input of `orbslam2py.datasets.open_recorded`. A file of that name goes first.
     sensor
         What to deliver images for; by default the richest there is.
     settings
@@ -60,13 +60,13 @@ def open_source(
     Returns
     -------
     IterableSequence or LiveSource
-        A `LiveSource`, started already, for what is live.
+        For a live input a `LiveSource` that has been started.
 
     Raises
     ------
     DatasetError
-        If there is nothing of that name, it is in use or not allowed, its package is not
-        installed, or it has no images for the sensor.
+        If the input does not exist, is in use or not allowed, its package is not installed, or it
+        has no images for the sensor.
     SettingsError
         If there are no settings, or they are wrong.
     ImageError

@@ -101,7 +101,7 @@ class Pairing:
         return empty if len(empty) < len(self._waiting) else []
 
     def clear(self) -> None:
-        """Drop and count what waits: the device begins anew."""
+        """Drop and count what waits: the device starts again."""
         self._newest = {}
         for stream, queue in self._waiting.items():
             while queue:

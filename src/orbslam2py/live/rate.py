@@ -10,7 +10,7 @@ _FALLEN, _RECOVERED = 0.7, 0.85
 
 
 class RateWatch:
-    """Counts the frames of a window, and tells when their rate falls or recovers.
+    """Counts the frames of a time window, and reports when their rate falls or recovers.
 
     Parameters
     ----------

@@ -42,9 +42,9 @@ class RealSense:
     name
         Name for messages.
     find
-        Returns the camera as the SDK has it, each time anew: it may have been plugged in again.
+        Returns a new SDK object of the camera at each call: it may have been plugged in again.
     request
-        What it is asked for.
+        The request of the user.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class RealSense:
 
     @property
     def streams(self) -> tuple[Stream, ...]:
-        """What it will deliver."""
+        """The streams that it will deliver."""
         images = tuple(one.stream for one in self._plan.images if one.stream is not None)
         return (*images, "imu") if self._plan.motion else images
 
@@ -84,7 +84,7 @@ class RealSense:
     def start(self, sink: Sink, /) -> None:
         """Open and start the streams; see `device.Device.start`."""
         device = self._find()
-        # The modes of the first time: the frames must stay what they were.
+        # The modes of the first time: the frames must not change.
         plan = make_plan(device, self.name, self._request)
         self._stop = threading.Event()
         self._clock = _Times(sink)
@@ -257,7 +257,7 @@ def _key(profile: Any) -> tuple[Any, int]:
 
 
 def _watch_for_removal(device: Any, sink: Sink) -> None:
-    """Have the sink told when the camera is unplugged."""
+    """Report it to the sink when the camera is unplugged."""
 
     def changed(information: Any) -> None:
         if information.was_removed(device):
@@ -322,7 +322,7 @@ def _find(name: str, serial: str) -> Any:
         )
     raise DatasetError(
         f"{name} is not there: no RealSense camera is plugged in; plug it into a USB 3 port; "
-        "'orbslam2py devices' lists what is found"
+        "'orbslam2py devices' lists connected cameras"
     )
 
 
@@ -331,7 +331,7 @@ def _told(device: Any, what: Any) -> str:
 
 
 def _problem(name: str, text: str) -> str:
-    """Say what an error of the SDK means to the user."""
+    """Explain an error of the SDK to the user."""
     low = text.lower()
     if "busy" in low or "errno=16" in low or "in use" in low:
         return (

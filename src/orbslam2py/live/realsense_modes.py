@@ -20,14 +20,14 @@ from orbslam2py.errors import DatasetError
 from orbslam2py.live.device import Request, Stream
 from orbslam2py.settings import ImuSettings, Sensor, Settings, imu_noise
 
-#: Size and rate that are taken if nobody asks for others: all cameras of the D400 series have them.
+#: Default size and rate: all cameras of the D400 series have them.
 _SIZE, _RATE = (848, 480), 30
 #: Rates of gyro and accelerometer nearest to these are taken, Hz.
 _GYRO_RATE, _ACCEL_RATE = 200, 250
-#: The chip of the D435i and D455, whose noise is taken: the camera does not tell its own.
+#: The chip of the D435i and D455, whose noise is taken: the camera does not give its own.
 _CHIP = "bmi055"
 
-#: What is opened for a sensor: our stream, the stream of the SDK, its index and formats.
+#: Streams that are opened for a sensor: our stream, the stream of the SDK, its index and formats.
 _Wanted = tuple[tuple[Stream, Any, int, tuple[Any, ...]], ...]
 _INFRARED = (rs.format.y8,)
 _COLOUR = (rs.format.bgr8, rs.format.rgb8)
@@ -72,12 +72,12 @@ class Profile:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is opened for a request.
+    """Streams that are opened for a request.
 
     Attributes
     ----------
     kind
-        What the images are for.
+        Sensor for which the images are used.
     images
         Streams of images.
     motion
@@ -214,7 +214,7 @@ def _matching(
                 continue
             video = profile.as_video_stream_profile()
             mode = (video.width(), video.height(), profile.fps())
-            # Depth is registered to the images: its own size is nobody's business.
+            # Depth is registered to the images: its own size does not matter.
             sized = stream == "depth" or request.size in (None, mode[:2])
             rated = request.fps in (None, mode[2])
             if profile.stream_index() == index and sized and rated:
@@ -254,7 +254,7 @@ def _info(name: str, one: Profile) -> CameraInfo:
     info = CameraInfo.of(message, f"{name} ({one.stream})")
     if info is None:
         raise DatasetError(
-            f"{name} tells no calibration of its {one.stream} images; give --settings with a file"
+            f"{name} has no calibration of its {one.stream} images; give --settings with a file"
         )
     return info
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recording of what came in: an MCAP file with ROS 2 messages, which `run` takes as a bag."""
+"""Recording of the input: an MCAP file with ROS 2 messages, which `run` takes as a bag."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-#: Bytes that wait for the disk at most; what comes then is left out, and counted.
+#: Bytes that wait for the disk at most; later data are left out, and counted.
 _MOST_WAITING = 512 << 20
 #: Seconds to wait for the disk at the end before it is given up.
 _PATIENCE = 60.0
@@ -53,7 +53,7 @@ _NANO = 10**9
 
 
 class InputRecorder:
-    """Writes all complete frames and all samples of a live source, also those nobody takes.
+    """Writes all complete frames and all samples of a live source, also those that are not read.
 
     Images are written as they came, before they are rectified or scaled to 8 bits, with the
     settings as an attachment. Writing is done in a thread; if the disk cannot follow, frames are

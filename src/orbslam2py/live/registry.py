@@ -13,7 +13,7 @@ from orbslam2py.errors import DatasetError
 from orbslam2py.live.device import Device, FoundDevice, Request
 from orbslam2py.settings import Sensor
 
-#: What stands before the colon; a single letter is a drive of Windows.
+#: The text before the colon; a single letter is a drive of Windows.
 _PREFIX = re.compile(r"[a-z][a-z0-9]+")
 
 
@@ -28,7 +28,7 @@ class Kind:
     example
         A name as users write it.
     what
-        What it is, a few words.
+        Short description.
     module
         Module with ``open_device(request)``, which makes a `Device` (not started), and
         ``find_devices()``, which lists those that are plugged in. It is loaded on first use and

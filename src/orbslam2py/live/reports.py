@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a live source tells its user, without saying the same a thousand times."""
+"""Messages of a live source to its user, without endless repetition."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Reports:
         Parameters
         ----------
         kind
-            What the pause is for.
+            Kind of message that is not repeated during the pause.
         text
             The end of a sentence that begins with the name of the source.
         """
@@ -71,7 +71,7 @@ class Reports:
         _log.warning("%s %s", self._name, text)
 
     def info(self, text: str) -> None:
-        """Log what is no problem."""
+        """Log a message that is no problem."""
         _log.info("%s %s", self._name, text)
 
     def listed(self) -> list[str]:

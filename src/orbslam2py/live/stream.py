@@ -26,7 +26,7 @@ from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
-#: Seconds between two looks at whether somebody wants to stop.
+#: Seconds between checks whether the run should stop.
 _WAIT_SLICE = 0.1
 #: Seconds without a complete frame after which a device counts as lost.
 SILENCE = 5.0
@@ -48,14 +48,15 @@ class LiveStream:
     Images are paired by their stamps. A bounded queue holds complete frames: the oldest is dropped
     and counted, samples of the IMU never are. If the device is lost, sends images of another size
     or falls silent, this is reported and the device is started again until it answers; frames then
-    go on, with times that grow.
+    continue, with growing times.
 
     Parameters
     ----------
     device
         What delivers.
     sensor
-        What the images are for; by default the richest that the streams of the device can do.
+        Sensor for which the images are used; by default the richest that the streams of the device
+        can do.
     settings
         Settings, a file or a built-in name; by default those of the device.
     fps
@@ -129,7 +130,7 @@ class LiveStream:
 
     @property
     def n_dropped(self) -> int:
-        """Frames so far that were lost because nobody had taken them in time."""
+        """Number of frames that were lost so far because they were not read in time."""
         return self._inlet.n_dropped
 
     @property
@@ -172,7 +173,7 @@ class LiveStream:
         if self._started_at is None:
             self.device.start(self._inlet)
             self._started_at = time.monotonic()
-            # Whoever forgets to close it: threads of the device must not outlive the interpreter.
+            # If the user does not close it: threads of the device must not outlive the interpreter.
             self._end = weakref.finalize(self, _end, self._inlet, self.device)
 
     def __enter__(self) -> LiveStream:
@@ -282,7 +283,7 @@ class LiveStream:
                 self._restart(fault)
 
     def _silence(self) -> str | None:
-        """Say that no frame came for long, and what is missing; None if some did."""
+        """Report that no frame has arrived for long, and what is missing; None if some did."""
         now, inlet = time.monotonic(), self._inlet
         last = max(filter(None, (inlet.last_frame, self._started_at)), default=now)
         if now - last < SILENCE:
@@ -343,7 +344,7 @@ class LiveStream:
 
 
 def _end(inlet: Inlet, device: Device) -> None:
-    """Stop a device that nobody stopped, when its source is collected or the program ends."""
+    """Stop a device that is still running when its source is collected or the program ends."""
     inlet.close()
     with contextlib.suppress(Exception):  # a lost device may fail in any way
         device.stop()

@@ -34,7 +34,7 @@ _ENUM_FORMATS, _ENUM_SIZES, _ENUM_STEPS = (
 
 
 def name_of(number: int) -> str:
-    """Return the name of the product; empty if the system does not tell it."""
+    """Return the name of the product; empty if the system does not give it."""
     with contextlib.suppress(OSError):
         path = Path(f"/sys/class/video4linux/video{number}/name")
         return path.read_text(encoding="utf-8", errors="replace").strip()

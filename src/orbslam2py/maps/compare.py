@@ -114,4 +114,4 @@ def _of_rows(mine: NDArray[Any], theirs: NDArray[Any]) -> str:
     if mine.dtype.kind == "f" and rows.any():
         by = np.abs(mine.astype(np.float64) - theirs.astype(np.float64))[unequal].max()
         text += f", by at most {by:.3g}"
-    return text if rows.any() else "bits of zeros or of what is no number"
+    return text if rows.any() else "bits of zeros or of NaN"

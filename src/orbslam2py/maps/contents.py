@@ -130,7 +130,7 @@ class MapContents:
         Parameters
         ----------
         row
-            Of the map's first keyframe in `keyframes`.
+            Index in `keyframes` of the map's first keyframe.
         """
         is_upright = int(self.keyframes.ids[row]) in self.upright_roots
         return np.eye(4) if is_upright else np.asarray(self.keyframes.T_cw[row])

@@ -39,7 +39,7 @@ _LONGEST_STRETCH, _BREAK = 0.0005, 0.0005
 #: Number of kept images from which it is checked whether their keyframes still exist.
 _FEW_IMAGES = 100
 
-#: Gives the frames of a map that hang on known keyframes: ``recorded(map_index, keyframe_ids)``.
+#: Returns the frames of a map that refer to known keyframes: ``recorded(map_index, keyframe_ids)``.
 Recorded = Callable[[int, IntArray], RecordedFrames]
 
 
@@ -135,7 +135,7 @@ class MapAutosave:
             save_map(self.saved_map(), path)
 
     def _runs_before(self, contents: MapContents) -> tuple[Run, ...]:
-        # After a reset the map is another one, which the earlier runs know nothing of.
+        # After a reset the map is a new one, without the earlier runs.
         return self._earlier_runs if contents.map_index == self._first_map else ()
 
     def _present_run(self, contents: MapContents) -> Run:
@@ -171,7 +171,7 @@ class MapAutosave:
         self._autosave = None
 
     def changes(self, writer: MapWriter, before: ChangedContents | None) -> ChangedContents:
-        """Copy what a file lacks of the present map, which may differ from the map of the file.
+        """Copy the parts of the present map that a file lacks; the file may hold another map.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class MapAutosave:
         writer : MapWriter
             Of the file.
         changes : ChangedContents
-            What the file lacks of its map, from `changes`.
+            The parts that the file lacks, from `changes`.
         partly : bool
             Whether only the changes were examined.
         gently : bool
@@ -224,7 +224,7 @@ class MapAutosave:
         yield from settings_rows(self._settings, self._identity, contents)
         runs = (*self._runs_before(contents), self._present_run(contents))
         for number, run in enumerate(runs):
-            # Parts that are full change at the end alone; the last one is looked at again.
+            # Parts that are full change at the end alone; the last one is examined again.
             parts = sum(key[0] == number for key in writer.keys("frames"))
             yield from run_rows(number, run, first_part=max(0, parts - 1) if partly else 0)
         yield from map_rows(contents, changes.changed_keyframes)
@@ -303,7 +303,7 @@ class _Autosave:
             try:
                 self.save_now(everything=False)
             except Exception as error:
-                # Whatever it is: without this thread nothing would be saved any more, unnoticed.
+                # For any error: without this thread nothing would be saved any more, unnoticed.
                 told = str(error) if isinstance(error, MapFileError) else repr(error)
                 _log.warning("autosave failed and will be tried again: %s", told)
                 _log.debug("in full:", exc_info=error)
@@ -323,7 +323,7 @@ class _Autosave:
             try:
                 old.close()
             except MapFileError as error:
-                # What was committed is committed; the new map must not wait for that.
+                # Earlier commits stay; the new map must not wait for that.
                 _log.warning("the old map: %s", error)
 
 

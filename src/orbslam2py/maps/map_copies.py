@@ -23,7 +23,7 @@ from orbslam2py.maps.content_groups import (
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.units import sees_metres
 
-#: What the core has no need to know: which of its maps were given metres, and since which epoch.
+#: Not needed by the core: which of its maps were given metres, and since which epoch.
 _metric_roots: weakref.WeakKeyDictionary[core.Map, tuple[int, tuple[int, ...]]] = (
     weakref.WeakKeyDictionary()
 )
@@ -96,7 +96,7 @@ def take_changes(
         covisibility=Covisibility(**groups["covisibility"]),
     )
     epoch, roots = _metric_roots.get(slam_map, (-1, ()))
-    if epoch == contents.map_index:  # else it was emptied since, and ids began anew
+    if epoch == contents.map_index:  # otherwise the map was cleared since, and ids started again
         contents = replace(contents, metric_roots=living_roots(roots, contents.keyframes))
     contents = _with_upright_roots(contents, slam_map)
     return ChangedContents(contents, **groups["known"])
@@ -144,7 +144,7 @@ def restore_contents(
 
 
 def _with_upright_roots(contents: MapContents, slam_map: core.Map) -> MapContents:
-    """Add what an IMU knows of the maps; one camera's upright maps are in metres."""
+    """Add which maps an IMU has turned upright; one camera's upright maps are in metres."""
     keyframes = contents.keyframes
     roots = keyframes.ids[keyframes.parent < 0].tolist()
     upright = tuple(root for root in roots if slam_map.is_upright(slam_map.map_of(root)))

@@ -78,7 +78,7 @@ class MapFile:
             core.MapRestorer(rest, stored.n_keypoints)
             check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
             for _ in stored.keypoint_parts():
-                pass  # their checksums and sizes are looked at
+                pass  # their checksums and sizes are checked
 
     def restore(
         self,
@@ -122,7 +122,7 @@ class MapFile:
             if totals == self._totals:
                 yield MapTables(connection, tables)
                 return
-        # Not within the block, where whatever is wrong is said to be damage.
+        # Outside of the block, in which every error is reported as damage.
         raise MapFileError(f"{self.source} was changed since it was opened; open it again")
 
 

@@ -43,7 +43,7 @@ from orbslam2py.settings.settings import Settings
 _WRITTEN_BY = "give a file that 'orbslam2py run --save' or save_map has written"
 _COPY = "use a copy of the file"
 
-#: Characters of what is quoted in a message.
+#: Length of a quotation in a message, characters.
 _LONGEST = 200
 
 #: A keyframe's number, as far as 64 bits hold one.
@@ -101,7 +101,7 @@ def opened(
     named = str(path)
     version = _check_header(file, named)
     with _refusing(named):
-        # A writer that was killed may have left a journal: SQLite takes back what it says first.
+        # A writer that was killed may have left a journal: SQLite corrects its first report.
         interrupted = file.with_name(f"{file.name}-journal").exists()
         with contextlib.closing(connect(file, "rw" if interrupted else "ro")) as connection:
             connection.execute("PRAGMA cell_size_check = ON")

@@ -158,7 +158,7 @@ class BlobTable:
             rows = n if present.any() or not blob.optional else 0
             native = np.dtype(blob.dtype).newbyteorder("=")
             shape = (rows, blob.width) if blob.width else (rows,)
-            # Who leaves out a sparse one means zeros.
+            # A missing sparse column means zeros.
             arrays[blob.field] = np.zeros(shape, native) if blob.sparse else np.empty(shape, native)
         return arrays
 
@@ -320,7 +320,7 @@ def _lenses(rows: list[Row], table: Table) -> dict[str, NDArray[Any]]:
 
 
 def _column(rows: list[Row], place: int, dtype: Any) -> NDArray[Any]:
-    with np.errstate(over="ignore"):  # what is not finite then is refused with the rest
+    with np.errstate(over="ignore"):  # numbers that are not finite are then refused with the rest
         return np.array([row[place] for row in rows], dtype)
 
 

@@ -148,7 +148,7 @@ class MapWriter:
         except sqlite3.OperationalError as error:
             if "locked" not in str(error):
                 raise
-            # As much as the readers let through: less is lost should somebody copy the file alone.
+            # As much as the readers let through: less is lost if the file is copied alone.
             connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
             _log.warning(
                 "another program has %s open; keep %s-wal beside it, it belongs to the map",
@@ -166,14 +166,14 @@ class MapWriter:
         try:
             with contextlib.closing(connect(temporary, "rwc")) as connection:
                 take_mode(temporary, self.path)  # before anything private is in it
-                # Nobody sees the temporary file, so it needs no journal.
+                # The temporary file is not read by others, so it needs no journal.
                 connection.execute("PRAGMA journal_mode = OFF")
                 connection.execute("PRAGMA synchronous = OFF")
                 connection.executescript(create_script())
                 n = self._change(connection, rows, {})
                 if not self._once:
-                    # Readers see the last commit while the next is written, and so does whoever
-                    # comes after a crash. Switched on here, where a kill does no harm.
+                    # Readers see the last commit while the next is written, also after a crash.
+                    # Switched on here, where a kill does no harm.
                     connection.execute("PRAGMA journal_mode = WAL")
             _sync(temporary)
             _end_old_log(self.path)

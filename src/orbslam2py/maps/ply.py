@@ -20,7 +20,7 @@ _TYPES = {
     **{"uint32": "<u4", "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8"},
 }
 
-#: What the axes of positions are, where nothing else is said.
+#: Default axes of positions.
 FIRST_KEYFRAME_AXES = "camera frame of keyframe 0: x right, y down, z forward"
 
 

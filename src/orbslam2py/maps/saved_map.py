@@ -171,7 +171,7 @@ class SavedMap:
             Number of the map, from 0 for the oldest; by default the one with most images of the
             run.
         in_world
-            In the world of the map, whatever its first keyframe.
+            In the world of the map, independent of its first keyframe.
 
         Returns
         -------

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-#: Tells map files from other SQLite files: "ORBm" in ASCII.
+#: Identifies map files among SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
 #: Version of the format that is written; later ones are refused. Version 1 had no words, and
 #: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses, version 4 no rigs.
 FORMAT_VERSION = 5
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
-#: Programs that know nothing of it take it for a comment, and drop it when they write a file.
+#: Other programs treat it as a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
 #: The same for the roots of maps whose third axis is up, by an IMU.
 UPRIGHT = "# Upright maps, by their roots:"

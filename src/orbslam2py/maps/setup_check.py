@@ -95,7 +95,7 @@ def _differences(saved: Settings, present: Settings, where: str = "in the map") 
         before = getattr(getattr(saved, key.group), key.field)
         now = getattr(getattr(present, key.group), key.field)
         if before != now and (present.sensor in key.sensors or present.rig is not None):
-            # As it is written in the file: 0 or 1, not False or True.
+            # In the notation of the file: 0 or 1, not False or True.
             now, before = (int(v) if key.kind is bool else v for v in (now, before))
             yield f"{key.name} is {now}, {where} {before}"
     if present.rig != saved.rig:

@@ -69,7 +69,7 @@ def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapsh
     """
     chosen = int(slam_map.active_map) if map_index is None else map_index
     snapshot = core.snapshot_map(slam_map, chosen)
-    while map_index is None and slam_map.active_map != chosen:  # it was merged, or rests now
+    while map_index is None and slam_map.active_map != chosen:  # it was merged, or is inactive now
         chosen = int(slam_map.active_map)
         snapshot = core.snapshot_map(slam_map, chosen)
     keyframes, points = snapshot.keyframes, snapshot.points
@@ -96,7 +96,7 @@ def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
     while True:
         epoch, there = slam_map.epoch, slam_map.maps
         snapshots = [take_snapshot(slam_map, index) for index in there]
-        # Two that became one meanwhile would be listed twice, in two worlds.
+        # Two maps that were merged in between would be listed twice, in two worlds.
         if (slam_map.epoch, slam_map.maps) == (epoch, there):
             return snapshots
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from orbslam2py._arrays import FloatArray
 
-#: What is to be seen stays this far from the border, relative to the window.
+#: Distance of the drawn objects from the border, relative to the window.
 _MARGIN = 0.04
-#: A new window has room for what comes next.
+#: A new window has room for later positions.
 _HEADROOM = 1.3
 #: A window this much too large is made smaller.
 _TOO_LARGE = 2.6
@@ -76,7 +76,7 @@ class Framing:
         decay = np.exp(-_SPEED * seconds)
         pull = self.speed + _SPEED * off
         unit = np.array([*(2 * [self.unit_per_pixel]), 1.0 / max(self.size)])
-        if (np.abs(off) + np.abs(self.speed) < 0.2 * unit).all():  # nobody sees the rest
+        if (np.abs(off) + np.abs(self.speed) < 0.2 * unit).all():  # the rest is not visible
             return replace(self, state=goal, speed=np.zeros(3), goal=goal)
         return replace(
             self,

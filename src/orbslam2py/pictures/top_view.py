@@ -33,7 +33,7 @@ from orbslam2py.pictures.framing import Framing
 from orbslam2py.pictures.lettering import draw_text, text_width
 
 _SHIFT = 4
-#: The box of what is to be seen is found with at most this number of points.
+#: Most points that are used for the bounding box.
 _SAMPLE = 4000
 #: From this number of keyframes on, they are drawn smaller.
 _MANY_KEYFRAMES = 150

@@ -51,7 +51,7 @@ class OutputFile:
         target = Path(os.path.realpath(self.path))
         _check_folder(self.path, target)
         self._target = target
-        # Who writes it looks at the ending, so that one stays the last.
+        # The writer depends on the suffix, so the suffix stays at the end.
         self.temporary = temporary_beside(target, f".tmp{target.suffix.lower()}")
         self.require_room()
 

@@ -46,7 +46,7 @@ from orbslam2py.viewer.watching import FrameView
 
 #: Points and keyframes with neighbouring ids are one entity, which is written when one changes.
 _POINT_PAGE, _KEYFRAME_PAGE = 4096, 64
-#: Seconds of the recording between two states of the map, and of what is as long as the run.
+#: Seconds of the recording between two states of the map, and between two states of the whole path.
 _MAP_EVERY, _PATHS_EVERY = 0.25, 1.0
 _JPEG_QUALITY = 85
 #: Points of a border of the view of a fisheye lens, and the length of its rays in units of the map.
@@ -125,7 +125,7 @@ class RerunRecorder:
         self._stale_keyframes.update(np.unique(keyframes // _KEYFRAME_PAGE).tolist())
 
     def on_event(self, event: Event) -> None:
-        """Note what has happened."""
+        """Record an event."""
         text, level = _in_words(event)
         self._say(text, level)
 

@@ -88,7 +88,7 @@ class VideoFile:
         self._writer.release()
         try:
             if self.n_frames:
-                # OpenCV does not tell when writing fails, so it is tried whether reading works.
+                # OpenCV does not report failed writing, so the file is read as a test.
                 if not _is_video(self._file.temporary):
                     raise self._file.error("no whole file has come to the disk; is it full?")
                 self._file.publish()

@@ -19,7 +19,7 @@ from orbslam2py.trajectory.rotations import inverse_poses, poses_from, rotations
 _log = logging.getLogger(__name__)
 
 BASE = "base_link"
-#: Name of the camera's coordinates where its messages tell none.
+#: Default name of the camera's coordinate frame.
 _OPTICAL = "camera_optical_frame"
 _POSITION, _POSE = 3, 7
 
@@ -58,7 +58,7 @@ def base_of_camera() -> BaseFrame:
 
 
 def for_viewers(base: BaseFrame) -> BaseFrame:
-    """Return the same with all its transforms, for those who do not hear the robot's."""
+    """Return the same with all its transforms, for receivers without those of the robot."""
     T = base.robot.T_base_camera
     return replace(base, child=base.camera, T_base_child=T, publishes_tf=True)
 
@@ -80,7 +80,7 @@ def choose_base(
     Raises
     ------
     DatasetError
-        If a frame was named, and nothing tells where the camera is in it.
+        If a frame was named, and the pose of the camera in it is unknown.
     """
     base = (name or BASE).strip("/")
     camera = (device.frame if device is not None else "") or _OPTICAL
@@ -98,7 +98,7 @@ def choose_base(
     if told is None:
         told = pose_of_forward_camera()
         _log.warning(
-            "nothing tells where the camera is on the robot: %s is assumed to be at the camera, "
+            "the pose of the camera on the robot is unknown: %s is assumed to be at the camera, "
             "which looks forward; give --base-transform, or publish /tf_static",
             base,
         )

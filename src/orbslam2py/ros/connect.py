@@ -25,7 +25,7 @@ def connect(name: str) -> Transport:
     Raises
     ------
     DatasetError
-        If the name is none, its package is not installed, or nobody answers there.
+        If the name is invalid, its package is not installed, or there is no answer.
     """
     prefix, colon, address = name.partition(":")
     if not colon or prefix not in _KINDS:

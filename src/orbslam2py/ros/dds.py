@@ -52,7 +52,7 @@ _SLICE, _MOST_BLOCKING = 100 * _MILLISECOND, 10 * _MILLISECOND
 #: messages of all publishers share the number.
 _DEPTH, _DEPTH_OF = 10, {"sensor_msgs/msg/Imu": 2000}
 _LATCHED_DEPTH = 100
-#: Bytes before the content of a request or response: four that tell the byte order, then its head.
+#: Bytes before the content of a request or response: four with the byte order, then its head.
 _ORDER_SIZE, _HEAD_SIZE = 4, 16
 #: Publications that are listed at most.
 _MOST_ENDPOINTS = 10_000
@@ -259,7 +259,7 @@ def _quality(depth: int, *, reliable: bool = True, latched: bool = False, data: 
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
     ]
-    if latched:  # what is kept for those who come later
+    if latched:  # kept for later receivers
         policies.append(Policy.DurabilityService(0, Policy.History.KeepLast(depth), -1, -1, -1))
     if data:
         policies.append(Policy.Userdata(data.encode()))

@@ -22,7 +22,8 @@ _PLAIN: dict[str, Any] = {
     **{name: getattr(dds, name) for name in ("float32", "float64", "int8", "uint8", "int16")},
     **{name: getattr(dds, name) for name in ("uint16", "int32", "uint32", "int64", "uint64")},
 }
-#: What rmw_cyclonedds writes before each request and response: who asks, and the how-manieth time.
+#: What rmw_cyclonedds writes before each request and response: the client, and the number of its
+#: request.
 _REQUEST_HEAD: dict[str, Any] = {"client_guid": dds.uint64, "sequence_number": dds.int64}
 
 

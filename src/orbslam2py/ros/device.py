@@ -33,7 +33,7 @@ from orbslam2py.settings import ImuSettings, Sensor, Settings
 
 _log = logging.getLogger(__name__)
 
-#: Images per second if their stamps do not tell it.
+#: Images per second if their stamps do not show it.
 _USUAL_RATE = 30.0
 #: Images whose exact stamps are kept: those that wait to be tracked.
 _MOST_STAMPS = 1000
@@ -55,7 +55,7 @@ class TopicsDevice:
     kind
         ``ros2`` or ``zenoh``.
     request
-        What the user asks for.
+        The request of the user.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class TopicsDevice:
         self._lock = threading.RLock()
         self._subscriptions: list[Subscription] = []
         self._sink: Sink | None = None
-        #: Stamps [ns] by what the sink gets [s], which cannot hold all their digits.
+        #: Stamps [ns] by the times of the sink [s], which cannot hold all their digits.
         self._nanoseconds: OrderedDict[float, int] = OrderedDict()
         _log.info(
             "%s: domain %d, on %s",
@@ -95,7 +95,7 @@ class TopicsDevice:
 
     @property
     def streams(self) -> tuple[Stream, ...]:
-        """What it delivers."""
+        """The streams that it delivers."""
         found: list[Stream] = list(self._images)
         return (*found, "imu") if self._imu else tuple(found)
 
@@ -145,7 +145,7 @@ class TopicsDevice:
         return replace(made, camera=replace(made.camera, rgb=False))
 
     def imu_settings(self) -> ImuSettings | None:
-        """Return None: messages do not tell the noise of an IMU."""
+        """Return None: messages do not contain the noise of an IMU."""
         return None
 
     def start(self, sink: Sink, /) -> None:
@@ -278,7 +278,7 @@ class TopicsDevice:
 
 
 def _named_topics(given: Mapping[str, str] | str | None) -> tuple[dict[str, str], str]:
-    """Split what the user named into the topics by role and the one of the IMU."""
+    """Split the names given by the user into topics by role and the topic of the IMU."""
     text = (
         given if isinstance(given, str) else ",".join(f"{k}={v}" for k, v in (given or {}).items())
     )
@@ -294,7 +294,7 @@ def _imu_topics(name: str, gathered: Gathered, named: str) -> dict[str, Topic]:
     Raises
     ------
     DatasetError
-        If there is none, or it cannot be told which.
+        If there is none, or the choice is ambiguous.
     """
     topics = [one for one in gathered.bag.topics if one.kind == IMU]
     if named:
@@ -313,5 +313,6 @@ def _imu_topics(name: str, gathered: Gathered, named: str) -> dict[str, Topic]:
             f"{title}: nothing is published as {IMU}; start the node of the IMU, or leave out --imu"
         )
     raise DatasetError(
-        f"{title}: cannot tell which of {listed} is the IMU; name it: --topics imu={topics[0].name}"
+        f"{title}: cannot decide which of {listed} is the IMU; name it: --topics "
+        f"imu={topics[0].name}"
     )

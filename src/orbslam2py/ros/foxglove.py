@@ -22,9 +22,9 @@ from orbslam2py.ros.types import type_store
 _log = logging.getLogger(__name__)
 
 LOOPBACK, PORT = "127.0.0.1", 8765
-#: Ports that are tried if nobody names one.
+#: Ports that are tried by default.
 _MOST_PORTS = 20
-#: Seconds after which latched messages are sent again: the app may have connected meanwhile.
+#: Seconds after which latched messages are sent again: the app may have connected in between.
 _AGAIN = 1.0
 #: What starting a server raises; the package's own error is not public in each version.
 _ERRORS = (RuntimeError, OSError, ValueError, getattr(foxglove, "FoxgloveError", RuntimeError))
@@ -49,7 +49,7 @@ class Serving:
 
 
 class FoxgloveTransport:
-    """Publishes to Foxglove's app, or to a file; nobody publishes to us: see `Transport`.
+    """Publishes to Foxglove's app, or to a file; clients do not publish here: see `Transport`.
 
     Messages are those of ROS 2 (CDR), with their definitions, so that the file is also a bag.
 
@@ -86,7 +86,7 @@ class FoxgloveTransport:
                 self.where,
                 ""
                 if serving.host == LOOPBACK
-                else ". Whoever can reach this address sees the images",
+                else ". Everyone who can reach this address sees the images",
             )
         else:
             self.where = str(file)

@@ -58,7 +58,7 @@ class GatheredMessages(Bag):
         self._contents = [kept for _, kept in given]
 
     def messages(self, topic: Topic) -> list[Message]:
-        """Tell where the messages of a topic are, in the order of arrival."""
+        """Return the positions of the messages of a topic, in the order of arrival."""
         number = self.topics.index(topic)
         return [
             Message(came, number, Place(came, -1, position, len(content)))
@@ -72,7 +72,7 @@ class GatheredMessages(Bag):
 
 @dataclass(frozen=True)
 class Gathered:
-    """What was published for some seconds.
+    """Messages published during some seconds.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Gathered:
 
 
 def gather(transport: Transport, name: str, named: Mapping[str, str], *, imu: bool) -> Gathered:
-    """Receive what tells the cameras: some images, CameraInfo, transforms, samples of the IMU.
+    """Receive data about the cameras: some images, CameraInfo, transforms, samples of an IMU.
 
     Parameters
     ----------

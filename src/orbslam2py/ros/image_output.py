@@ -32,7 +32,7 @@ _TOPICS = {
 
 @dataclass(frozen=True, eq=False)
 class SeenImage:
-    """A copy of what was seen.
+    """A copy of image and keypoints.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ _FLOAT32, _FLOAT_SIZE = 7, 4
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands in the head of a message.
+    """The header of a message.
 
     Attributes
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Odometry without jumps: the motion from image to image, whatever becomes of the map."""
+"""Odometry without jumps: the motion from image to image, independent of corrections of the map."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from orbslam2py.trajectory.rotations import inverse_poses
 
 #: Attempts to read two poses of one state of the map, which others write.
 _ATTEMPTS = 5
-#: Numbers of a pose that is read twice differ by less than this if nobody moved the map.
+#: Numbers of a pose that is read twice differ by less than this if the map did not move.
 _STILL = 1e-9
 
 
@@ -42,10 +42,10 @@ class OdometryStep:
 class SmoothOdometry:
     """Adds up the motion between images, in the thread that tracks.
 
-    The pose of the image before follows the keyframe that it hangs on, so a correction of the map
-    between the two images moves both and their difference stays. Over a tracking loss the motion is
-    that between the last pose and the first one after it. If the camera is in another map then, the
-    path goes on where it stopped.
+    The pose of the image before follows its reference keyframe, so a correction of the map between
+    the two images moves both and their difference stays. Over a tracking loss the motion is that
+    between the last pose and the first one after it. If the camera is in another map then, the path
+    goes on where it stopped.
 
     Parameters
     ----------
@@ -82,12 +82,12 @@ class SmoothOdometry:
             again = self._pose(before)
             if first is None or second is None or again is None:
                 return None
-            if np.allclose(first, again, rtol=0, atol=_STILL):  # nobody moved the map meanwhile
+            if np.allclose(first, again, rtol=0, atol=_STILL):  # the map has not moved
                 return np.asarray(first @ inverse_poses(second), np.float64)
         return None
 
     def _pose(self, frame: core.TrackedFrame) -> FloatArray | None:
-        """Return ``T_cw`` in the map as it is; None if the map of the frame is no more."""
+        """Return ``T_cw`` in the present map; None if the map of the frame is no more."""
         try:
             core.follow_map(self._map, frame)
         except StateError:

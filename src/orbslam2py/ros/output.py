@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Publishes what a running system knows as topics and transforms of ROS 2 (REP 103, REP 105)."""
+"""Publishes poses and map of a running system as topics and transforms (REP 103, REP 105)."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _ROOM = 50
 _UNKNOWN = 1e9
 #: Seconds between two looks at whether the thread still takes images.
 _WAIT_SLICE = 0.2
-#: Topics by their last name: type, and whether those who come later get the last message.
+#: Topics by their last name: type, and whether later subscribers get the last message.
 _TOPICS = {
     "pose": (messages.POSE, False),
     "pose_with_covariance": (messages.POSE_WITH_COVARIANCE, False),
@@ -80,11 +80,11 @@ class RosOutput:
     transport
         The connection; closed at the end.
     system
-        What is published.
+        The published system.
     base
         The frame of the robot.
     stamp_of
-        Tells the stamp of the images that belong to a time of the system.
+        Returns the stamp of the images for a time of the system.
     map_path
         File in which the service ``save_map`` saves the map; None: no services.
     with_images

@@ -14,7 +14,7 @@ from orbslam2py.slam.system import System
 
 _log = logging.getLogger(__name__)
 
-#: Where the one number of a request stands, behind the four bytes that tell the byte order.
+#: Position of the one number of a request, behind the four bytes of the byte order.
 _DATA = 4
 
 
@@ -26,7 +26,7 @@ def serve(transport: Transport, system: System, map_path: Path) -> None:
     transport
         The connection.
     system
-        What is asked.
+        The system that answers.
     map_path
         File that the map is saved in.
     """

@@ -23,7 +23,7 @@ Answer = Callable[[bytes], bytes]
 
 @dataclass(frozen=True, order=True)
 class LiveTopic:
-    """A topic that somebody publishes.
+    """A published topic.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Publication(Protocol):
     """A topic that is being published."""
 
     def send(self, content: bytes, stamp: int | None = None) -> None:
-        """Publish a message, serialised as CDR. Does not wait for those who receive it.
+        """Publish a message, serialised as CDR. Does not wait for subscribers.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Transport(Protocol):
         name, kind
             Name with a ``/`` before it, and type.
         latched
-            Whether those who come later get the last message.
+            Whether later subscribers get the last message.
         """
         ...
 
@@ -128,7 +128,7 @@ def domain_of(text: str, prefix: str) -> int:
     Raises
     ------
     DatasetError
-        If it is none.
+        If it is invalid.
     """
     source = f"{prefix}:{text}" if text else "ROS_DOMAIN_ID"
     given = text or os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
@@ -141,6 +141,6 @@ def domain_of(text: str, prefix: str) -> int:
 
 
 def is_local_only() -> bool:
-    """Tell whether the variables of ROS 2 limit discovery to this computer."""
+    """Return whether the variables of ROS 2 limit discovery to this computer."""
     wanted = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper()
     return wanted in ("LOCALHOST", "OFF") or os.environ.get("ROS_LOCALHOST_ONLY", "") == "1"

@@ -93,7 +93,7 @@ def message_class(kind: str) -> Any:
 
 
 def to_cdr(message: Any) -> bytes:
-    """Serialise a message: four bytes that tell the byte order, then CDR."""
+    """Serialise a message: four bytes with the byte order, then CDR."""
     return bytes(type_store().serialize_cdr(message, message.__msgtype__))
 
 
@@ -109,7 +109,7 @@ def from_cdr(content: bytes, kind: str) -> Any:
 
 
 def is_known(kind: str) -> bool:
-    """Tell whether messages of a type can be read."""
+    """Return whether messages of a type can be read."""
     return kind in type_store().types
 
 

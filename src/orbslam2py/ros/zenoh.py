@@ -65,7 +65,7 @@ class ZenohTransport:
     Raises
     ------
     DatasetError
-        If there is no router, or the address is none.
+        If there is no router, or the address is invalid.
     """
 
     prefix = "zenoh"
@@ -197,7 +197,7 @@ class ZenohTransport:
 
 
 def topic_of_token(token: str, own_id: str = "") -> LiveTopic | None:
-    """Read the token of a publisher; None if it is one of something else, or of this session."""
+    """Read the token of a publisher; None for another kind, or for this session."""
     parts = token.split("/")
     if len(parts) != _TOKEN_PARTS or parts[5] != _PUBLISHER or parts[2] == own_id:
         return None
@@ -215,13 +215,13 @@ def topic_of_token(token: str, own_id: str = "") -> LiveTopic | None:
 
 
 def attachment_of(number: int, time_ns: int, token: str) -> bytes:
-    """Make what rmw_zenoh sends beside a message: its number, its time, and who sends it."""
+    """Make what rmw_zenoh sends beside a message: its number, its time, and its sender."""
     identifier = hashlib.md5(token.encode(), usedforsecurity=False).digest()
     return _ATTACHMENT.pack(number, time_ns, len(identifier), identifier)
 
 
 class _Reader:
-    """Gives messages on in a thread of its own: the threads of Zenoh are not to wait."""
+    """Passes messages on in its own thread: the threads of Zenoh are not to wait."""
 
     def __init__(self, receive: Receive, depth: int) -> None:
         self.declared: Any = None
@@ -298,7 +298,7 @@ def _reply(query: Any, key: str, answer: Answer) -> None:
 
 
 def _quality(depth: int, *, reliable: bool = True, latched: bool = False) -> str:
-    """Write a quality of service as tokens have it: what is usual stays empty."""
+    """Write a quality of service as tokens have it: default values stay empty."""
     reliability = "" if reliable else _BEST_EFFORT
     durability = _TRANSIENT_LOCAL if latched else ""
     return f"{reliability}:{durability}:,{depth}:,:,:,,"

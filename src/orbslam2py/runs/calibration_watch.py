@@ -36,7 +36,7 @@ _log = logging.getLogger(__name__)
 N_IMAGES, _EVERY, _N_ROWS = 49, 8, 3
 #: Pairs of images that decide: those with most motion, and the points of each.
 _N_PAIRS, _N_POINTS = 8, 150
-#: Least median motion of a pair's points, in image widths: less tells nothing.
+#: Least median motion of a pair's points, in image widths: fewer are not enough.
 _MOTION = 0.012
 _LEAST_POINTS = 60
 
@@ -145,7 +145,7 @@ class CalibrationWatch:
         if not self._raw_pairs or pair is None or images.right is None:
             return images
         if images.image.shape[:2] != (pair.left.height, pair.left.width):
-            return images  # another calibration: the size tells it
+            return images  # another calibration: the size shows it
         if self._rectifiers is None:
             self._rectifiers = rectifiers_of(self._settings)
         assert self._rectifiers is not None
@@ -238,7 +238,7 @@ def settings_beside(source: object) -> Settings | None:
     try:
         settings: Settings = default()
     except (OrbSlamError, OSError):
-        # What comes with the images is not asked for if the user has given something else.
+        # The calibration of the images is not used if the user has given another one.
         return None
     return settings
 
@@ -261,7 +261,7 @@ def check_calibration(
         A sequence from `orbslam2py.open_sequence`, or any source of consecutive frames with
         ``timestamp`` and ``images``.
     settings : Settings, str or Path, optional
-        The calibration: settings, or for a source that tells its sensor a file or a built-in name;
+        The calibration: settings, or, for a source with a known sensor, a file or a built-in name;
         by default the source's own.
 
     Returns
@@ -325,7 +325,7 @@ def _settings_for(source: object, choice: Settings | str | Path | None) -> Setti
     sensor = getattr(source, "sensor", None)
     if sensor is None and isinstance(choice, str | Path):
         raise SettingsError(
-            f"{shown(source)} does not tell its sensor, which settings of a file or a name are "
-            f"read for; give Settings.load({str(choice)!r}, sensor)"
+            f"{shown(source)} does not name its sensor, which is needed to read settings from a "
+            f"file or by a name; give Settings.load({str(choice)!r}, sensor)"
         )
     return resolve_settings(choice, sensor or Sensor.MONOCULAR)

@@ -41,7 +41,7 @@ class RunControl:
             self._paused, self._steps = True, 0
 
     def resume(self) -> None:
-        """Let it go on."""
+        """Let it continue."""
         with self._condition:
             self._paused = False
             self._condition.notify_all()

@@ -24,7 +24,7 @@ from orbslam2py.slam.frame_source import check_images
 
 #: Seconds between two looks at whether the run was stopped.
 _WAIT_SLICE = 0.2
-#: A decimal number, as whoever reads the files takes it.
+#: A decimal number, as in the files.
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 

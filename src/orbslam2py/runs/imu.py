@@ -65,7 +65,7 @@ def find_imu(
     wanted
         True: it must be there. None: if there are both, settings and samples. False: none.
     settings, samples
-        Given by the user; by default what comes with the source.
+        Given by the user; by default those of the source.
     is_live
         Whether the source is a camera.
 
@@ -77,7 +77,7 @@ def find_imu(
     Raises
     ------
     DatasetError, SettingsError
-        If it must be there and is not, or what the user gave or what must be there is wrong.
+        If a required input is missing, or an input is invalid.
     """
     if wanted is False:
         return None
@@ -110,12 +110,12 @@ def find_imu(
 
 
 def imu_entry(check: ImuCheck, n_samples: int, *, metric: bool) -> dict[str, Any]:
-    """Say for ``report.json`` whether the IMU fits the camera, and what was measured of it.
+    """Return the entry of ``report.json``: whether the IMU fits the camera, and its measurements.
 
     `metric`: the IMU has turned the main map upright and, with one camera, scaled it to metres.
 
     Time offset in seconds, rotation from IMU to camera (3, 3), bias of the gyro in rad/s, gravity
-    in m/s^2; None where the motion did not tell them.
+    in m/s^2; None if the motion did not determine them.
     """
     report = check.report
     rates = None if report is None else report.rates

@@ -14,7 +14,7 @@ from orbslam2py._files import atomic_write
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.slam.records import InertialState
 
-#: What comes after the number of the frame and its time stamp.
+#: Columns after the number of the frame and its time stamp.
 IMU_COLUMNS = (
     *("vx", "vy", "vz", "gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
     *("accel_bias_x", "accel_bias_y", "accel_bias_z"),

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from orbslam2py.datasets.base import FrameTimes
 
-#: Stages of the latency in their order, and what each is.
+#: Stages of the latency in their order, with descriptions.
 LATENCY_STAGES = {
     "latency.transport": "from the middle of the exposure until the image is in this computer",
     "latency.pairing": "waiting for the other image of the same moment",
     "latency.queue": "waiting for the frame before, and for samples of the IMU",
     "latency.prepare": "rectifying and converting",
     "latency.track": "tracking",
-    "latency.total": "all of them; from the arrival if the camera does not tell the exposure",
+    "latency.total": "all of them; from the arrival if the camera does not give the exposure",
 }
 
 

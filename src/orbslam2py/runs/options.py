@@ -67,10 +67,10 @@ class RunOptions:
     autosave: float | None = None
     """Interval at which the maps are also saved during the run, seconds."""
     imu: bool | None = None
-    """Whether the samples of an IMU go into the system; None: if the recording has samples and
-    something tells its settings."""
+    """Whether the samples of an IMU go into the system; None: if the recording has samples and its
+    settings are known."""
     imu_settings: ImuSettings | None = None
-    """The IMU beside the unrectified (left) camera; by default what comes with the recording."""
+    """The IMU beside the unrectified (left) camera; by default those of the recording."""
     imu_samples: ImuSamples | None = None
     """Its samples; by default those of the recording."""
 
@@ -129,11 +129,11 @@ class RunOptions:
         if self.localize_after == 0 and self.load_map is None:
             raise DatasetError(
                 "--localize needs a map from the beginning: load one with --load (load_map), or "
-                "say after how many frames the map is to stay as it is (localize_after)"
+                "say after how many frames the map is fixed (localize_after)"
             )
         if self.final_adjustment and self.localize_after is not None:
             raise DatasetError(
-                "--final-adjustment changes the map, which --localize leaves as it is; leave out "
+                "--final-adjustment changes the map, but --localize keeps it unchanged; leave out "
                 "one of them (final_adjustment, localize_after)"
             )
         if self.initial_pose is not None and self.load_map is None:

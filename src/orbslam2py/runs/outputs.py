@@ -39,7 +39,7 @@ from orbslam2py.trajectory.frame_times import is_frame_table
 
 _log = logging.getLogger(__name__)
 
-#: What the run worked with.
+#: Input of the run.
 _SETTINGS = "settings.yaml"
 
 #: Files that a run may have no content for.
@@ -188,7 +188,7 @@ def _results_in(folder: Path) -> Iterator[Path]:
 
 
 def _other_work(folder: Path, settings: str) -> str | None:
-    """Return a file with the name of a result that is none."""
+    """Return a file that has the name of a result but is none."""
     if holds_run(folder):
         return None
     own = folder / _SETTINGS

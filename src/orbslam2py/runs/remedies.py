@@ -23,8 +23,8 @@ _WHAT_HELPS = {
     Reason.AMBIGUOUS_MOTION: "move further sideways; include things at several distances, "
     "not one wall or flat ground",
     Reason.DEGENERATE_VIEWS: "translate: a plane alone can start a map, a pure rotation cannot",
-    Reason.NO_THIRD_VIEW: "go on moving; a mask for what moves (--mask)",
-    Reason.INITIAL_MAP_FAILED: "go on moving sideways; more features (ORBextractor.nFeatures), "
+    Reason.NO_THIRD_VIEW: "keep moving; a mask for moving objects (--mask)",
+    Reason.INITIAL_MAP_FAILED: "keep moving sideways; more features (ORBextractor.nFeatures), "
     "things at several distances",
     Reason.FEW_MATCHES_LAST_FRAME: "slower motion, higher frame rate; come back to the map",
     Reason.FEW_MATCHES_REFERENCE: "slower motion, higher frame rate, more features "

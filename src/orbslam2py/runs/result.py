@@ -112,7 +112,7 @@ class RunResult:
     alignment: dict[str, Any] | None = None
     """Noise of aligned sightings, as in ``report.json``; None where nothing is aligned."""
     imu: dict[str, Any] | None = None
-    """What is known of the IMU, as in ``report.json``; None without one."""
+    """Results about the IMU, as in ``report.json``; None without one."""
     imu_settings: ImuSettings | None = None
     """Noise, place and clock of the IMU that the run used; None without one."""
     warnings: list[str] = field(default_factory=list)
@@ -122,7 +122,7 @@ class RunResult:
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     input_counts: dict[str, float] | None = None
-    """What a live source counted: frames, losses, samples; None if it counts nothing."""
+    """Counts of a live source: frames, losses, samples; None if it counts nothing."""
     is_live: bool = False
     """The images came from a camera."""
     saved_map: Path | None = None

@@ -192,7 +192,7 @@ def _prepared(
         return
     if target is not None and is_among_results and is_name_of_result(target.name):
         raise DatasetError(
-            f"{target} is what one of the run's results is called; give the map another name"
+            f"{target} is the name of one of the run's results; give the map another name"
         )
     prepare_output_folder(folder, force=force, settings=settings)
     if target is not None and is_among_results:

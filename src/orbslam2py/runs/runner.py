@@ -170,7 +170,7 @@ class SequenceRunner:
             result.interrupted = stop.is_set() and not result.is_live
             if result.interrupted:
                 seen = f"{len(result.rows)} of {result.n_frames} frames"
-                _log.warning("interrupted; saving what was done so far (%s)", seen)
+                _log.warning("interrupted; saving the results so far (%s)", seen)
             self._shut_down(system)
         self._save_map(system)
         result.warnings += getattr(result.sequence, "doubts", ())  # logged when it was opened
@@ -240,7 +240,7 @@ class SequenceRunner:
             with contextlib.closing(self._feed.frames(stop)) as frames:
                 for position, frame in enumerate(frames):
                     if position == self._options.localize_after:
-                        # The map is to be complete, whatever the speed of mapping.
+                        # The map must be complete, at any speed of mapping.
                         self._wait_for_mapping(system, stop)
                         system.localization_mode = True
                     row = self._track(system, frame)
@@ -303,7 +303,7 @@ class SequenceRunner:
     def _file_of(self, frame: FedFrame) -> str:
         """Return the file of a frame's image; empty if unknown."""
         path_of = getattr(self.result.sequence, "image_path", None)
-        # A sequence of the user's own may have something else of that name.
+        # A user's sequence may have another attribute of that name.
         place = path_of(frame.index) if callable(path_of) else None
         return str(place) if isinstance(place, Path) else ""
 
@@ -316,7 +316,7 @@ class SequenceRunner:
         self.result.slam_seconds += time.perf_counter() - begin
 
     def _adjust_finished_map(self, system: System, stop: threading.Event) -> None:
-        # Ctrl-C is how a camera's run ends; the results of others are wanted at once then.
+        # Ctrl-C is how a camera's run ends; the results of others are needed immediately.
         ended = stop.is_set() and not self.result.is_live
         if self._options.final_adjustment and system.n_keyframes > 0 and not ended:
             give_up = threading.Event() if self.result.is_live else stop
@@ -351,7 +351,7 @@ class SequenceRunner:
         self.result.error = error
         if not isinstance(error, OrbSlamError):
             _log.error("unexpected error; please report it", exc_info=error)
-        elif self.result.command is None:  # the command tells its user what its run gives
+        elif self.result.command is None:  # the command reports the results of its run
             _log.warning("the run failed: %s", describe_error(error))
 
     def _collect(self, system: System) -> None:
@@ -367,7 +367,7 @@ class SequenceRunner:
                 # Of equal times that of the main map counts.
                 if row.record.map_index == main or row.record.timestamp not in by_time:
                     by_time[row.record.timestamp] = position
-        # A map may hold frames from before it, when one before it came to nothing.
+        # A map may contain earlier frames, if an earlier map was dropped.
         self._move_earlier_poses(system)
         result.trajectories = [
             _renumber(

@@ -80,7 +80,7 @@ class Timeline:
         """
         seconds = np.array([float(row.timestamp) for row in rows])
         seconds = seconds - seconds[:1].sum()
-        # What nobody looked at is no failure: tracking went on across it.
+        # Frames without a check do not count as failures: tracking went on across it.
         failed = np.array([row.state not in ("OK", "DROPPED") for row in rows], bool)
         parts = merged_into or {}
         maps = np.array([_map_of(row, parts) for row in rows], np.int64)

@@ -156,7 +156,7 @@ def _is_published(settings: Settings) -> bool:
 
 def _raw_camera(one: CameraRectification) -> CameraSettings:
     fx, fy, cx, cy = (float(one.K[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
-    # No camera has its centre farther away than settings allow, nor is one needed to tell so.
+    # No camera centre is farther away than settings allow.
     cx, cy = (max(-1e5, min(1e5, centre)) for centre in (cx, cy))
     return CameraSettings(fx, fy, cx, cy, width=one.width, height=one.height)
 

@@ -24,7 +24,7 @@ def compare_calibrations(
     size: tuple[int, int],
     thresholds: FitThresholds | None = None,
 ) -> Misfit | None:
-    """Judge a calibration by another one that comes with the images.
+    """Compare a calibration with the one that comes with the images.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def compare_calibrations(
     data : Settings
         The one that comes with the images, of the same sensor.
     size : tuple of int
-        Width and height of the images as they are tracked, pixels.
+        Width and height of the tracked images, pixels.
     thresholds : FitThresholds, optional
         The limits.
 
@@ -52,7 +52,7 @@ def compare_calibrations(
     return Misfit(
         "; ".join(seen),
         f"settings of {whose}{images}",
-        "leave the settings out to take what comes with the images"
+        "leave the settings out to use those of the images"
         + (f", or give {right}" if right and right != used else ""),
     )
 
@@ -84,7 +84,7 @@ def _differences(
 
 
 def _raw_cameras(settings: Settings) -> list[CameraSettings]:
-    """The cameras of the images as they are on disk: two if the settings rectify them."""
+    """The cameras of the images on disk: two if the settings rectify them."""
     pair = settings.rectification
     if settings.right is not None:
         return [settings.camera, settings.right.camera]

@@ -25,7 +25,7 @@ USUAL_BASELINE = 0.075
 USUAL_CLOSE_FACTOR = 40.0
 #: Raw units per metre: millimetres.
 USUAL_DEPTH_FACTOR = 1000.0
-#: For people who get these units without having named them.
+#: Shown to users of these default units.
 ASSUMED_DEPTH_FACTOR = (
     f"{USUAL_DEPTH_FACTOR:g} units per metre (millimetres) are assumed; if they are others, give "
     "--depth-factor"

@@ -20,7 +20,7 @@ def rigid_transform(T: object, name: str) -> FloatArray:
     T
         4 x 4 numbers: a rotation and a translation [m].
     name
-        What it is called, for messages.
+        Its name in messages.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def checked_extrinsics(T: object, name: str) -> FloatArray:
     T
         4 x 4 numbers: a rotation and a translation [m].
     name
-        What it is called, for messages.
+        Its name in messages.
 
     Returns
     -------
@@ -58,13 +58,13 @@ def checked_extrinsics(T: object, name: str) -> FloatArray:
     Raises
     ------
     SettingsError
-        If it is no rigid transform, or both cameras stand in one place.
+        If it is no rigid transform, or both cameras have the same position.
     """
     pose = rigid_transform(T, name)
     if not pose[:3, 3].any():
         raise SettingsError(
-            "the two cameras of the pair stand in one place, so they see no depth; look at where "
-            "their calibration puts them, or use one of them (--sensor mono)"
+            "the two cameras of the pair have the same position, so they measure no depth; "
+            "check where their calibration puts them, or use one of them (--sensor mono)"
         )
     return pose
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lens models of settings beyond the pinhole: names, parameters, and other programs' names.
 
-Fisheye models, and OpenCV's thin prism: their keypoints are pixels of the images as they come.
+Fisheye models, and OpenCV's thin prism: their keypoints are pixels of the unrectified images.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ _MODELS = {name: model for model, names in _NAMES.items() for name in names.spli
 def needs_right_camera() -> str:
     """Say what settings of a fisheye pair need."""
     return (
-        "a stereo pair of fisheye cameras needs both cameras and how they stand: Camera2.fx, fy, "
-        "cx, cy with the lens, and Stereo.T_c1_c2 (from camera 2 to camera 1, in metres); "
-        "'orbslam2py import-camera --sensor stereo' makes such settings of a calibration of both, "
-        "and --sensor mono uses one camera alone"
+        "a stereo pair of fisheye cameras needs both cameras and their relative pose: "
+        "Camera2.fx, fy, cx, cy with the lens, and Stereo.T_c1_c2 (from camera 2 to camera 1, "
+        "in metres); 'orbslam2py import-camera --sensor stereo' makes such settings of a "
+        "calibration of both, and --sensor mono uses one camera alone"
     )
 
 

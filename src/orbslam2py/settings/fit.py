@@ -22,7 +22,7 @@ from orbslam2py.settings.settings import Settings, builtin_settings
 
 @dataclass(frozen=True)
 class FitThresholds:
-    """How far a right calibration may be from what is usual.
+    """Largest usual deviations of a correct calibration.
 
     Right, but odd cameras lie within: phones held upright, wide-angle lenses, images cut at one
     side, pixels that are not square. ``docs/method/calibration.md`` has the measurements.
@@ -65,8 +65,8 @@ class FitThresholds:
     wrong_sign: float = 0.5
     """Most part of them that lies farther right in the right image than in the left."""
     gain: float = 2.5
-    """A changed focal length that divides the robust cost of epipolar distances by this is better
-    without doubt: a rolling shutter looks like another one, too ..."""
+    """A changed focal length that divides the robust cost of epipolar distances by this is
+    certainly better: a rolling shutter looks like another one, too ..."""
     clearer: float = 1.1
     """... if what it gains is by this factor more than what another change gains ..."""
     gain_with_depth: float = 1.25
@@ -95,9 +95,9 @@ class Misfit:
     Attributes
     ----------
     seen
-        What was seen.
+        The finding.
     cause
-        What is likely behind it.
+        Its likely cause.
     remedy
         What to do.
     """
@@ -168,7 +168,7 @@ def find_misfit(
     settings : Settings
         The calibration (of the rectified images for a pair).
     size : tuple of int
-        Width and height of the images as they are tracked, pixels.
+        Width and height of the tracked images, pixels.
     thresholds : FitThresholds, optional
         The limits.
 

@@ -59,7 +59,7 @@ class ForeignFormat:
     written_by
         The programs that write it.
     description
-        What is read from it, in one line.
+        The data that are read from it, in one line.
     sign
         Return whether a text is of this kind.
     example
@@ -125,7 +125,7 @@ def _is_woodscape(content: CalibrationText) -> bool:
     return isinstance(inner, dict) and inner.get("model") == "radial_poly" and "cx_offset" in inner
 
 
-#: Keys that hold a whole camera matrix in files of nobody's format.
+#: Keys of a camera matrix in files without a known format.
 MATRIX_KEYS = ("camera_matrix", "cameraMatrix", "intrinsic_matrix", "mtx", "K", "intrinsics")
 
 
@@ -329,7 +329,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
     ForeignFormat(
         "numbers",
         "the numbers of a camera",
-        "scripts of one's own, RealSense tools: JSON or YAML",
+        "your own scripts, RealSense tools: JSON or YAML",
         "One camera of fx, fy, cx, cy (or a camera matrix) and its coefficients; a fisheye with "
         "its model, such as fisheye or ds.",
         _is_numbers,

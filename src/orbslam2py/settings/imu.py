@@ -123,7 +123,7 @@ class ImuSettings(EqualByValue):
             raise SettingsError("; ".join(problems))
 
     def doubts(self) -> list[str]:
-        """Say what is allowed but probably a mistake, such as noise in degrees."""
+        """Return values that are allowed but probably wrong, such as noise in degrees."""
         found = []
         for name, plausible in _PLAUSIBLE.items():
             value = getattr(self, name)

@@ -78,7 +78,7 @@ def read_imu_settings(*paths: str | PathLike[str], noise: ImuNoise | None = None
 
 
 def has_imu_keys(path: Path) -> bool:
-    """Whether a settings file tells anything about an IMU."""
+    """Whether a settings file contains keys of an IMU."""
     try:
         return bool(_statements_of(path))
     except SettingsError:
@@ -86,7 +86,7 @@ def has_imu_keys(path: Path) -> bool:
 
 
 def imu_of_settings_file(path: Path, noise: ImuNoise | None = None) -> ImuSettings | None:
-    """Read what a settings file of a camera also says of an IMU.
+    """Read the keys of an IMU in a settings file of a camera.
 
     Parameters
     ----------
@@ -98,8 +98,8 @@ def imu_of_settings_file(path: Path, noise: ImuNoise | None = None) -> ImuSettin
     Returns
     -------
     ImuSettings or None
-        None if there is no such file or it says nothing. What is incomplete or wrong is logged as a
-        warning, since the camera can be used without it.
+        None if there is no such file or it says nothing. Missing or wrong values are logged as a
+        warning, because the camera can be used without them.
     """
     if not path.is_file() or not has_imu_keys(path):
         return None
@@ -142,9 +142,9 @@ def _settings_of(statements: _Statements, noise: ImuNoise | None, source: str) -
     if "T_ci" not in values:
         if "T_bc" not in values:
             raise SettingsError(
-                f"{source}: no key tells where the IMU stands beside the camera; add IMU.T_b_c1 "
-                "(ORB-SLAM3), or the file that has T_cam_imu (Kalibr's camchain) or the camera's "
-                "T_BS (EuRoC's cam0/sensor.yaml)"
+                f"{source}: no key gives the pose of the IMU relative to the camera; add "
+                "IMU.T_b_c1 (ORB-SLAM3), or the file that has T_cam_imu (Kalibr's camchain) or "
+                "the camera's T_BS (EuRoC's cam0/sensor.yaml)"
             )
         values["T_ci"] = np.linalg.inv(values["T_bc"]) @ values.get("T_bi", np.eye(4))
     fields = (*_NOISE, "T_ci", "time_offset", "rate")
@@ -252,8 +252,9 @@ def _of_kalibr(path: Path, text: str) -> _Statements:
                 statements[name] = _Stated(_plain(where, values[key], name), where)
     if not statements:
         raise SettingsError(
-            f"{path} tells nothing about an IMU; give settings of ORB-SLAM3 with IMU.*, Kalibr's "
-            "imu.yaml and camchain with T_cam_imu, EuRoC's sensor.yaml or Basalt's calibration"
+            f"{path} contains nothing about an IMU; give settings of ORB-SLAM3 with IMU.*, "
+            "Kalibr's imu.yaml and camchain with T_cam_imu, EuRoC's sensor.yaml or Basalt's "
+            "calibration"
         )
     return statements
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Noise of IMUs by the name of the chip, for those who have not measured theirs.
+"""Noise of IMUs by the name of the chip, for IMUs that were not measured.
 
 Noise densities are the typical values of the makers' data sheets, whose numbers stand beside them.
 They were not compared with the current revisions: check yours. Makers do not state random walks of

@@ -117,7 +117,7 @@ KEYS: tuple[Key, ...] = (
         "camera",
         "bf",
         float,
-        # What lies below is no distance of anything, and the depth of close points becomes 0.
+        # A smaller value is no real distance, and the depth of close points becomes 0.
         _between(1e-6, 1e6, "pixel metres (baseline times fx)"),
         _DEPTH_SENSORS,
         True,
@@ -139,7 +139,7 @@ KEYS: tuple[Key, ...] = (
         "depth",
         "raw_per_metre",
         float,
-        # What lies below counts as 1 in the core: "already metres" in the files of ORB-SLAM.
+        # A smaller value counts as 1 in the core: "already metres" in the files of ORB-SLAM.
         _between(1e-5, 1e9, "raw units per metre"),
         _RGBD,
         True,
@@ -201,7 +201,7 @@ def is_known(name: str) -> bool:
     return name in _NAMES
 
 
-#: What others call a key, without the signs between words.
+#: Names of a key in other programs, without the signs between words.
 _OTHER_NAMES = {
     "baseline": "Camera.bf",
     "depthfactor": "DepthMapFactor",
@@ -257,7 +257,7 @@ _MAY_BE_UNKNOWN = ("width", "height", "raw_per_metre")
 
 
 def focal_problems(what: str, K: FloatArray) -> list[str]:
-    """Return what is wrong with the focal lengths of a camera matrix."""
+    """Return faults of the focal lengths of a camera matrix."""
     lengths = float(K[0, 0]), float(K[1, 1])
     if all(map(FOCAL.allows, lengths)):
         return []
@@ -268,7 +268,7 @@ def focal_problems(what: str, K: FloatArray) -> list[str]:
 
 
 def check_group(group: str, values: object) -> list[str]:
-    """Return what is wrong with the values of one settings dataclass.
+    """Return faults of the values of one settings dataclass.
 
     Valid values are converted to the type of their key, so that NumPy's numbers become Python's.
     """

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How two calibrated cameras are used as a pair: rectified, or as they are.
+"""How two calibrated cameras are used as a pair: rectified or unrectified.
 
 A fisheye image is rectified by stretching it to a plane. At the angle t from the optical axis a
 pixel becomes 1 / cos(t)^2 times as long as in the middle. Pairs whose borders would be stretched by
-more than 3, which is 55 degrees from the axis, are matched as they are. Pinhole models are always
-rectified: their images are nearly planes already.
+more than 3, which is 55 degrees from the axis, are matched without rectification. Pinhole models
+are always rectified: their images are nearly planes already.
 """
 
 from __future__ import annotations
@@ -75,13 +75,13 @@ def cameras_of_pair(
     Parameters
     ----------
     left, right
-        Both cameras as they are; the rate and the colour order are those of the left one.
+        Both unrectified cameras; the rate and the colour order are those of the left one.
     T_right_left
         From left to right camera coordinates, (4, 4), metres.
     size
         Width and height of the images, pixels.
     name
-        What the calibration calls the transform, for messages.
+        Name of the transform in the calibration, for messages.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def _rectification_of_models(
 def _common_rectangle(
     models: _Two, rotations: tuple[FloatArray, FloatArray]
 ) -> tuple[float, float, float, float]:
-    """Left, right, upper and lower end, on the plane at distance 1, of what both images show."""
+    """Left, right, upper and lower end of the common view, on the plane at distance 1."""
     ends = []
     for model, R in zip(models, rotations, strict=True):
         width, height = model.image_size

@@ -112,7 +112,7 @@ def _eight(distortion: FloatArray) -> tuple[float, ...]:
 
 
 def _positive_roots(polynomial: FloatArray) -> FloatArray:
-    # What changes nothing within 89 degrees of the axis would overflow where it is divided by.
+    # Coefficients that change nothing within 89 degrees of the axis would overflow in a division.
     power = np.arange(len(polynomial))[::-1]
     roots = np.roots(np.where(np.abs(polynomial) * _FARTHEST**power < 1e-12, 0.0, polynomial))
     real = (np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)

@@ -61,7 +61,7 @@ def rectified_pair(
     problems: list[Problem],
     models: tuple[str, str] = (PINHOLE, PINHOLE),
 ) -> RawPair | None:
-    """Find how a pair with its pose is used, as ORB-SLAM3 1.0 tells it.
+    """Find how a pair with its pose is used, by the rules of ORB-SLAM3 1.0.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def rectified_pair(
     second
         ``Camera2.*`` and ``Stereo.T_c1_c2``, or ``Tlr``.
     problems
-        Takes what is wrong, except with the first camera, which is read elsewhere.
+        Receives the faults, except those of the first camera, which is read elsewhere.
     models
         Of both cameras: "pinhole" or a fisheye model.
 

@@ -135,7 +135,7 @@ def groups_of_text(
     missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
     advice = []
-    # With one key missing it was forgotten; with several the file is for something else.
+    # With one key missing it was forgotten; with several the file has another purpose.
     if 1 < missing == len(problems) and (served := _served_by(document)):
         names = " and ".join(map(str, served))
         advice.append(

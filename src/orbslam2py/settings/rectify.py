@@ -39,8 +39,8 @@ def rectification_of_pair(
     """
     if not np.any(T_right_left[:3, 3]):
         raise SettingsError(
-            "the two cameras of the pair stand in one place, so they see no depth; look at where "
-            "their calibration puts them, or use one of them (--sensor mono)"
+            "the two cameras of the pair have the same position, so they measure no depth; "
+            "check where their calibration puts them, or use one of them (--sensor mono)"
         )
     R_left, R_right, P_left, P_right, *_ = cv2.stereoRectify(
         cameraMatrix1=K[0],

@@ -79,12 +79,12 @@ class RigCamera(EqualByValue, MadeAgainByCopies):
 
     @property
     def centre(self) -> FloatArray:
-        """Where the camera stands in the body, (3,), metres."""
+        """Position of the camera in the body, (3,), metres."""
         return self.T_body_camera[:3, 3]
 
 
 class DepthSource(NamedTuple):
-    """What gives a camera of a rig its depths.
+    """Source of the depths of a camera of a rig.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def checked_rig(cameras: Sequence[RigCamera]) -> tuple[RigCamera, ...]:
     if not any(source.has_depth for source in depth_sources(rig)):
         raise SettingsError(
             "no camera of the rig has depths: no two views overlap, and none has depth images, so "
-            "that nothing tells lengths. Check the extrinsics (T_c1_c2: from camera 2 to camera 1, "
+            "the scale is unknown. Check the extrinsics (T_c1_c2: from camera 2 to camera 1, "
             "metres; a calibration may give the inverse), say which cameras deliver depth images "
             "(Camera1.depth: 1), or track one camera with --sensor mono"
         )
@@ -139,7 +139,7 @@ def checked_rig(cameras: Sequence[RigCamera]) -> tuple[RigCamera, ...]:
 
 
 def overlap(first: RigCamera, second: RigCamera) -> float:
-    """Return the share of the view of one camera that another one sees as well, 0 to 1."""
+    """Return the share of a camera's view that another one also sees, 0 to 1."""
     width, height = first.size
     columns, rows = np.linspace(0, width - 1, _RAYS), np.linspace(0, height - 1, _RAYS)
     pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
@@ -159,7 +159,7 @@ def _alike(first: RigCamera, second: RigCamera) -> float:
 
 
 def depth_sources(rig: Sequence[RigCamera]) -> tuple[DepthSource, ...]:
-    """Find what gives each camera its depths: its depth images, or the camera with most overlap."""
+    """Find each camera's source of depths: its depth images, or the camera with most overlap."""
     n = len(rig)
     shared = np.zeros((n, n))
     for i in range(n):
@@ -187,7 +187,7 @@ def depth_sources(rig: Sequence[RigCamera]) -> tuple[DepthSource, ...]:
 
 
 def doubts_of_rig(rig: Sequence[RigCamera]) -> list[str]:
-    """Return what is allowed but probably wrong, one sentence each."""
+    """Return values that are allowed but probably wrong, one sentence each."""
     return [
         f"Camera{i + 1} stands {np.linalg.norm(camera.centre):.4g} m from Camera1; extrinsics are "
         "in metres: divide translations in millimetres by 1000"

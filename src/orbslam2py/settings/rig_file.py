@@ -30,7 +30,7 @@ _OWN = re.compile(r"\bCamera\.(?!(?:" + "|".join(_COMMON) + r")\b)")
 
 
 def is_rig_text(text: str) -> bool:
-    """Return whether a settings file tells how cameras of a rig are mounted."""
+    """Return whether a settings file contains poses of the cameras of a rig."""
     return any(_MOUNT.match(line) for line in text.splitlines())
 
 
@@ -114,7 +114,7 @@ def _groups_of_camera(
             path,
             Sensor.MONOCULAR,
             allow_unknown=allow_unknown,
-            warn=warn if number == 1 else _say_nothing,  # what is common was said of the first one
+            warn=warn if number == 1 else _say_nothing,  # the first one reported common faults
         )
     except SettingsError as error:
         text = _OWN.sub(f"Camera{number}.", str(error))

@@ -81,7 +81,8 @@ class Settings:
     viewer
         Appearance of the map view.
     right
-        The right camera of a fisheye pair, whose images are matched as they are; else None.
+        The right camera of a fisheye pair, whose images are matched without rectification; else
+        None.
     rig
         The cameras of a rig, the first of which is the body and is also `camera`; else None.
 
@@ -148,7 +149,7 @@ class Settings:
         if self.rectification is not None:
             raise SettingsError(
                 "rectification and right are both given; a pair is rectified, or has a right "
-                "camera that is matched as it is: keep one"
+                "camera whose images are matched without rectification: keep one"
             )
         bf = self.right.baseline * self.camera.pixels_per_radian
         object.__setattr__(self, "camera", replace(self.camera, bf=bf))

@@ -162,7 +162,7 @@ def _check_size_kept(result: Translated, given: Mapping[str, Entry]) -> None:
 def _translate_baseline(result: Translated, entry: Entry, sensor: Sensor) -> None:
     """Compute ``Camera.bf`` from the baseline in metres."""
     if not sensor.has_depth:
-        result.entries.setdefault("Camera.bf", entry)  # not looked at
+        result.entries.setdefault("Camera.bf", entry)  # not checked
         return
     baseline, fx = _number(entry), _number(result.entries.get("Camera.fx"))
     if baseline is None or not 0 < baseline <= 1e6:

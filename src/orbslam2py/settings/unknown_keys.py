@@ -25,9 +25,9 @@ _CAMERA_WORD = re.compile(
     r"|cameras?\d*|(camera_?)?(intrinsics|matrix)|dist(ortion)?(_?(coeffs?|coefficients|model))?",
     re.IGNORECASE,
 )
-#: Groups of keys that have nothing to do with a camera, whatever a key in them is called.
+#: Groups of keys that never concern a camera.
 _OTHER_GROUPS = ("imu", "system", "file")
-#: Keys of a camera that say nothing of its images.
+#: Keys of a camera that do not describe its images.
 _OF_NO_EFFECT = re.compile(r"name|setup|(over)?lapping(begin|end)", re.IGNORECASE)
 
 _OURS = (*(key.name for key in KEYS), *FISHEYE_KEYS, *RECTIFICATION_KEYS)
@@ -38,7 +38,7 @@ _MOST_NAMED = 6
 
 
 def problem_of_unknown_key(entry: Entry) -> str | None:
-    """Return what is wrong with an unknown key; None if the file may have it."""
+    """Return the fault of an unknown key; None if the file may have it."""
     group, _, last = entry.key.rpartition(".")
     if group.partition(".")[0].lower() in _OTHER_GROUPS:
         return None
@@ -52,8 +52,8 @@ def problem_of_unknown_key(entry: Entry) -> str | None:
         return f"unknown key {entry.key}; {_advice(meant, entry)}"
     if of_camera:
         return (
-            f"unknown key {entry.key}, which by its name describes the camera, so it is not read "
-            "past; give what it says by a key of orbslam2py ('orbslam2py settings show tum1' "
+            f"unknown key {entry.key}, which by its name describes the camera, so it is not "
+            "ignored; express it by a key of orbslam2py ('orbslam2py settings show tum1' "
             "prints a complete file), or, if it changes nothing about the images, begin the line "
             "with #"
         )

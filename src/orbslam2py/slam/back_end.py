@@ -34,7 +34,7 @@ from orbslam2py.slam.options import SystemOptions
 
 _log = logging.getLogger(__name__)
 
-#: Seconds that a reset waits for a worker before it says who is late.
+#: Seconds that a reset waits for a worker before it names the late one.
 RESET_PATIENCE = 60.0
 
 
@@ -61,7 +61,7 @@ class BackEnd:
         alignment = config.alignment.for_sensor(sensor)
         self.keyframe_index = core.KeyFrameIndex()
         self.events = EventDispatcher(callbacks, threaded=threaded)
-        # The other core works on images while mapping goes on, unless these wait for it.
+        # The other core processes images during mapping, unless the images wait for mapping.
         images_wait = not threaded or (options.wait_for_mapping and not sensor.has_depth)
         self.mapping = LocalMapping(
             self.map,
@@ -135,7 +135,7 @@ class BackEnd:
         Parameters
         ----------
         map_index : int
-            Its number. If it has been merged into another one meanwhile, nothing is dropped.
+            Its number. If it has been merged into another map since, nothing is dropped.
         timeout : float
             Seconds to wait for each worker.
         keep : callable
@@ -203,7 +203,7 @@ class BackEnd:
             wait = drain and (wait_for_adjustment or worker is not self.adjustment.worker)
             try:
                 if wait and worker is self.loop_closing.worker:
-                    with contextlib.suppress(WorkerError):  # told when it is finished
+                    with contextlib.suppress(WorkerError):  # reported at the end
                         self.loop_closing.end()
                 worker.finish(drain=wait, timeout=timeout)
             except Exception as error:

@@ -200,8 +200,8 @@ class KeyframeConfig:
     inliers: int = 15
     """A keyframe needs more inliers than this (ORB-SLAM)."""
     spacing_with_depth: int = 2
-    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is not
-    weak; with a single camera it is one."""
+    """Least number of frames from one keyframe to the next with stereo and RGB-D, unless tracking
+    is weak. With a single camera it is 1."""
 
 
 @dataclass(frozen=True)
@@ -440,14 +440,14 @@ def value_of(config: Config, name: str) -> float | int | bool:
     if name in known:
         return known[name]
     near = difflib.get_close_matches(str(name), known, 1, 0.5)
-    # A field is known by its own name as well, whatever its section.
+    # A field may also be named without its section.
     near = near or [full for full in known if full.partition(".")[2] == name]
     hint = f"did you mean {near[0]}?" if near else "'orbslam2py config' lists all names"
     raise SettingsError(f"the configuration has no value {shown(name)}; {hint}")
 
 
 def read_change(text: str) -> tuple[str, float | int | bool]:
-    """Read a change as it is written on the command line: ``tracking.map_matches=12``.
+    """Parse a change in the notation of the command line: ``tracking.map_matches=12``.
 
     Raises
     ------

@@ -234,7 +234,7 @@ class EventDispatcher:
             "callbacks", self._deliver, threaded=threaded
         )
 
-        #: Told of every event, like the callbacks; assign another tuple to add one.
+        #: Functions that get every event, like the callbacks; assign another tuple to add one.
         self.watchers: tuple[Callable[[Event], None], ...] = ()
 
     def _deliver(self, deliver: Callable[[], None]) -> None:

@@ -143,7 +143,7 @@ class FrameRecorder:
         with self._lock:
             self._record_waiting(believed=not lost)
             if frame is self._doubted:
-                # A copy: the frame itself goes on following the map while others may read.
+                # A copy: the frame itself continues to follow the map while others may read.
                 self._waiting = frame.pose_alone()
             else:
                 self._append(frame, lost=lost, fixed_map=fixed_map)

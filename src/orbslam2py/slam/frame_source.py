@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a system can track: any object that gives images and time stamps."""
+"""Input that a system can track: any object that gives images and time stamps."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class TimedImages(NamedTuple):
     imu: Any = None
 
 
-#: A sequence, or whatever gives frames: a camera, a generator, a part of a sequence.
+#: A sequence, or any iterable of frames: a camera, a generator, a part of a sequence.
 FrameSource = Recording | Iterable[SomeFrame]
 
 
@@ -69,7 +69,7 @@ def timed_images(
     source
         The source of the images.
     sensor
-        What the images are needed for.
+        Sensor for which the images are used.
     with_imu
         Also take the samples of the frames' ``imu``, if they have it.
 
@@ -78,7 +78,7 @@ def timed_images(
     StateError
         If the source was opened for another sensor, or gives an object that is no frame.
     DatasetError
-        If an object that should be an image is none.
+        If an object should be an image but is none.
     """
     is_recording = hasattr(source, "timestamps") and hasattr(source, "load")
     if not is_recording and (not isinstance(source, Iterable) or isinstance(source, str | bytes)):
@@ -163,7 +163,7 @@ def arrays_of(
                 mask,
             )
         right = _present(getattr(some, "right", None), "right image", timestamp)
-        # The mask is the left image's; what it hides there needs no partner.
+        # The mask is the left image's; keypoints hidden by it need no partner.
         return some.image, right, None if mask is None else (mask, None)
     if sensor is Sensor.RIG:
         if not isinstance(images, tuple | list):

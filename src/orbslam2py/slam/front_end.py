@@ -171,7 +171,7 @@ class FrontEnd:
         timer: StageTimer,
         mask: PairMask | None = None,
     ) -> core.Frame:
-        """Frame of a pair: rectified, or raw with settings that tell how it is rectified."""
+        """Frame of a pair: rectified, or raw with settings that contain the rectification."""
         assert self._pair_extractor is not None
         self._check(left, "left image")
         self._check(right, "right image")
@@ -360,7 +360,7 @@ def check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> No
 
 
 def _refuse_masked(array: npt.NDArray[np.uint8], what: str) -> None:
-    # What lies below its mask would be tracked: there is no grey value for "nothing".
+    # Points under its mask would be tracked: there is no grey value for "nothing".
     if type(array) is not np.ndarray and isinstance(array, np.ma.MaskedArray):
         raise ImageError(
             f"{what} is a masked array; give its data, and where to look as mask=, uint8 with 0 "

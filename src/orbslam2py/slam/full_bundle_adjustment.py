@@ -57,7 +57,7 @@ class FullBundleAdjustment:
     """Refines the whole map on demand; the fourth worker.
 
     It solves a copy of the map, so no other worker waits. Mapping pauses for a moment while the
-    result is written. Keyframes and points that were added meanwhile move with their parent or
+    result is written. Keyframes and points that were added in between move with their parent or
     reference keyframe.
 
     Parameters
@@ -103,7 +103,7 @@ class FullBundleAdjustment:
         self._latest: tuple[int, FullAdjustmentRecord] | None = None
         # Which map the last one begun is of.
         self._wanted: tuple[int, int] = -1, -1
-        #: Its jobs are numbers that tell one adjustment from another.
+        #: Its jobs are consecutive numbers of adjustments.
         self.worker: Worker[int] = Worker(
             "full bundle adjustment", self._process, threaded=threaded
         )
@@ -151,7 +151,7 @@ class FullBundleAdjustment:
 
     @contextlib.contextmanager
     def kept_away(self) -> Iterator[None]:
-        """Stop a running adjustment, and let none begin or end meanwhile.
+        """Stop a running adjustment, and block the begin and end of others.
 
         For callers that move the map themselves: later requests wait.
         """
@@ -169,7 +169,7 @@ class FullBundleAdjustment:
         return self._adjust(core.StopFlag(), chosen)
 
     def _refine_newest(self, cancelled: core.StopFlag, map_index: int) -> None:
-        """Adjust keyframes that were added meanwhile to the optimised map."""
+        """Move keyframes that were added in between with the optimised map."""
         newest = int(core.snapshot_keyframes(self._map, map_index).ids[-1])
         core.local_bundle_adjustment(self._map, newest, cancelled, self._monocular)
 

@@ -12,7 +12,7 @@ class InertialConfig:
     """Use of an IMU in tracking."""
 
     longest: float = 5.0
-    """The IMU leads through images without a pose for this time, s."""
+    """Longest time for which the IMU predicts poses without an image, s."""
     beyond: float = 0.5
     """Images with enough features without a match in the map for this time show a new place: the
     map is extended there (with depth) or another one is searched (one camera), s."""

@@ -34,7 +34,7 @@ class KeptImages:
         self._waiting: deque[core.Frame] = deque()
 
     def note(self, frame: core.Frame, *, is_keyframe: bool, waiting: bool) -> None:
-        """Take note of a tracked frame, and release what is no longer needed.
+        """Add a tracked frame, and release images that are no longer needed.
 
         Parameters
         ----------

@@ -35,7 +35,7 @@ class LocalMapping:
     config : MappingConfig
         Limits.
     alignment : AlignmentConfig or None
-        What is aligned; None: nothing.
+        Settings of the alignment; None: nothing.
     """
 
     def __init__(

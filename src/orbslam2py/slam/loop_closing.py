@@ -227,7 +227,7 @@ class LoopClosing:
     def _verify(self, keyframe: int, proposals: _Proposals) -> core.Loop | None:
         """Choose the verified loop, unless another place fits as well.
 
-        It leads to another map only if there is none in this map.
+        It may be in another map only if there is none in this map.
         """
 
         def confirmed(candidates: list[int]) -> list[core.Loop]:
@@ -273,7 +273,7 @@ class LoopClosing:
 
     # ---- correction ------------------------------------------------------------------------------
     def _close(self, loop: core.Loop, timer: StageTimer) -> None:
-        # What an adjustment refines is about to move.
+        # The map that an adjustment refines will move.
         with self._adjustment.kept_away(), self._mapping.pause(brief=True) as ticket:
             with timer("wait"):
                 ticket.wait()

@@ -87,13 +87,13 @@ class SystemOptions:
             )
         if self.deterministic:
             raise SettingsError(
-                "deterministic mode takes no time limit for the full adjustment: what is reached "
-                "in a given time differs from run to run; leave the limit out"
+                "deterministic mode takes no time limit for the full adjustment: the result after "
+                "a given time differs from run to run; leave the limit out"
             )
 
 
 def _changes_of(given: Any) -> dict[str, float | int | bool]:
-    """Return a configuration from changes (names with a dot) or from a whole one."""
+    """Return changes of a configuration, given as changes or as a whole `Config`."""
     if isinstance(given, Config):
         return given.changes()
     if not isinstance(given, Mapping):
@@ -139,7 +139,7 @@ class Setup:
             sensor = loaded.sensor if loaded is not None else sensor
         if sensor is None:
             raise SettingsError(
-                "say what the images come from: sensor='mono', 'stereo', 'rgbd' or 'rig'"
+                "give the sensor of the images: sensor='mono', 'stereo', 'rgbd' or 'rig'"
             )
         sensor = Sensor(sensor)
         if settings is None:

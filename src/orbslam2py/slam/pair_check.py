@@ -12,7 +12,7 @@ from orbslam2py._arrays import ByteArray
 
 _log = logging.getLogger(__name__)
 
-#: So many pairs are looked at, not counting those without any picture: a camera may begin dark.
+#: Number of pairs that are checked, not counting those without texture: a camera may begin dark.
 N_CHECKED, N_LOOKED_AT = 3, 100
 _TEXT = (
     "the left and the right image of a pair are the same one, which shows no depth: give the "

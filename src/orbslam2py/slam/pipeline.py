@@ -83,7 +83,7 @@ class Pipeline:
     inertial : InertialInput
         The samples of the IMU that wait for their images.
     localization : LocalizationSwitch
-        Whether the map stays as it is.
+        Localization mode: whether the map is fixed.
     recorder : FrameRecorder
         Poses of all frames.
     keeper : MapAutosave
@@ -136,7 +136,7 @@ class Pipeline:
         self.reset_requested = threading.Event()
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
-        # The map that came to nothing, and is given up before the next image.
+        # A failed map, which is dropped before the next image.
         self._given_up: int | None = None
         self._start_failed = False
         self._next_frame_id = 0
@@ -434,7 +434,7 @@ class Pipeline:
         self._last_timestamp = -math.inf
 
     def _give_up(self, map_index: int) -> bool:
-        """End a map; return False if it has been merged meanwhile."""
+        """End a map; return False if it has been merged since."""
         slam_map = self.back_end.map
         if len(slam_map.maps) > 1 or slam_map.active_map != map_index:
             keep = self.recorder.end_map

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Raw stereo pairs in the front end: rectified before features are found, or as they are."""
+"""Raw stereo pairs in the front end: rectified before features are detected, or not rectified."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _NOISE = 0.5
 _MOST_BITS, _MOST_ROWS = 50, 15.0
 _TEXT = (
     "the pairs come rectified already: the rows of their points differ by {given:.1f} pixels, and "
-    "by {rectified:.1f} after rectification by the settings; they are tracked as they are. Give "
-    "the raw images of both cameras, or settings without the calibration of the raw ones (LEFT.*, "
-    "RIGHT.*, Camera2.*)"
+    "by {rectified:.1f} after rectification by the settings; they are tracked without "
+    "rectification. Give the raw images of both cameras, or settings without the calibration of "
+    "the raw ones (LEFT.*, RIGHT.*, Camera2.*)"
 )
 
 #: Features of both images of a grey pair.
@@ -47,7 +47,7 @@ class RawPairs:
     Attributes
     ----------
     warning : str or None
-        What was logged: the first pairs come rectified already.
+        The logged text: the first pairs come rectified already.
     """
 
     def __init__(self, pair: StereoRectification, extract: Extract) -> None:
@@ -121,7 +121,7 @@ def _same_points(left: core.Extraction, right: core.Extraction) -> tuple[FloatAr
 
 
 def raw_pairs_of(settings: Settings, extract: Extract) -> RawPairs | None:
-    """Make what rectifies the pairs of an application; None if they come as they are tracked."""
+    """Make the rectification of an application's pairs; None if they need none."""
     pair = settings.rectification
     if pair is None or pair.applied:
         return None

@@ -52,7 +52,7 @@ class Reason(str, enum.Enum):
 
 
 class Verdict(str, enum.Enum):
-    """Whether a pose is accepted, by its evidence."""
+    """Decision about a pose, made from its evidence: accepted, uncertain, or rejected."""
 
     STRONG = "strong"
     """Accepted: as many expected points were found as in the frames before."""
@@ -201,8 +201,8 @@ class TrackingRecord(EqualByValue):
     """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (total)."""
     features: FrameFeatures | None = None
     evidence: Evidence | None = None
-    """What speaks for the pose, or, if the reason is `Reason.WEAK_EVIDENCE`, spoke against it; None
-    where no pose was found, and in the frame that begins a map."""
+    """Evidence for the pose, or against it if the reason is `Reason.WEAK_EVIDENCE`; None where no
+    pose was found, and in the frame that begins a map."""
     method: PoseMethod | None = None
     """What found the pose; `PoseMethod.IMU`: the IMU alone, for the image shows too little. None
     without a pose, and in the frame that begins a map."""

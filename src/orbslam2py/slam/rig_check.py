@@ -14,7 +14,7 @@ from orbslam2py.settings.rig import DepthSource, RigCamera, overlap
 
 _log = logging.getLogger(__name__)
 
-#: Frames that are looked at, and keypoints that a frame needs to count.
+#: Number of frames that are checked, and least number of keypoints of such a frame.
 _FRAMES, _LEAST_KEYPOINTS = 10, 100
 #: Share of the keypoints in the common view that find their partner at least.
 _LEAST_SHARE = 0.04
@@ -30,14 +30,14 @@ class RigCheck:
     rig : sequence of RigCamera
         The cameras.
     sources : sequence of DepthSource
-        What gives each of them its depths.
+        Source of the depths of each camera.
     scales : ScalePyramid
         Of the extraction.
 
     Attributes
     ----------
     warning : str or None
-        What was logged.
+        The logged text.
     """
 
     def __init__(
@@ -86,8 +86,8 @@ class RigCheck:
         if by_inverse > _CLEARLY_MORE * max(n_depths / frames, 5):
             self.warning = (
                 f"{found}; by the inverse extrinsics it finds {by_inverse}: Camera2.T_c1_c2 maps "
-                "coordinates of camera 2 into those of camera 1, and so on; give the inverse of "
-                "what you have"
+                "coordinates of camera 2 into those of camera 1, and so on; give the inverse "
+                "transforms"
             )
         else:
             self.warning = (

@@ -187,7 +187,7 @@ class RigFrontEnd(FrontEnd):
                 self._told_missing.add(i)
                 _log.warning(
                     "camera %d of the rig has seen nothing in %d images until %.3f s: is its lens "
-                    "covered? Tracking goes on with the others",
+                    "covered? Tracking continues with the others",
                     *(i + 1, _BLIND_FRAMES, timestamp),
                 )
             seeing.append(sees)
@@ -257,7 +257,7 @@ class RigFrontEnd(FrontEnd):
             return
         self._told_missing.add(i)
         _log.warning(
-            "camera %d of the rig has no image at %.3f s; tracking goes on with the others",
+            "camera %d of the rig has no image at %.3f s; tracking continues with the others",
             i + 1,
             timestamp,
         )

@@ -114,8 +114,8 @@ class System:
         `orbslam2py.slam.config`.
     imu : ImuSettings, str or path, optional
         The IMU beside the (left, unrectified) camera, or a file that `read_imu_settings` reads; by
-        default what the settings file says of it (``IMU.*`` keys). Needed for `track` with samples
-        and for `add_imu`.
+        default the ``IMU.*`` keys of the settings file. Needed for `track` with samples and for
+        `add_imu`.
     check_calibration : bool
         Log one warning if the calibration contradicts the size of the first image.
         `orbslam2py.check_calibration` also examines the images.
@@ -226,9 +226,9 @@ class System:
         imu : array of float64 (n, 7), optional
             Samples of an IMU since the image before, rows ``[t, gyro x, y, z, accelerometer x, y,
             z]``: seconds on the clock of the IMU, rad/s, m/s^2. A sample after the image helps to
-            interpolate. They are compared with the path of the camera; a warning says what is wrong
-            with them. Once they fit, they predict poses, and for up to 5 s replace those that
-            images do not give. The call never waits for samples.
+            interpolate. They are compared with the path of the camera; a warning names their
+            faults. Once they fit, they predict poses, and for up to 5 s replace those that images
+            do not give. The call never waits for samples.
 
         Returns
         -------
@@ -244,8 +244,8 @@ class System:
             After shutdown, or while another call runs.
         ImageError
             For bad or missing images and for bad time stamps; the frame is not counted and nothing
-            has changed, but for a reset that had been asked for. Samples of the IMU wait for the
-            next image then.
+            has changed, except for a requested reset. Samples of the IMU wait for the next image
+            then.
         DatasetError
             If the samples of the IMU have another shape; nothing has changed then.
         WorkerError
@@ -265,7 +265,7 @@ class System:
             return self.pipeline.process(timestamp, first, second, chosen, details=details)
 
     def add_imu(self, samples: ImuSamples | npt.ArrayLike) -> None:
-        """Add samples of an IMU as they come; they wait for the images that they belong to.
+        """Add samples of an IMU when they arrive; they wait for the images that they belong to.
 
         May be called from any thread, also while an image is tracked. Samples that are late,
         repeated, not finite or out of order are left out or sorted; one warning says so.
@@ -295,7 +295,7 @@ class System:
         Returns
         -------
         bool
-            Whether they came; True at once without IMU settings.
+            Whether they came; Returns True immediately without IMU settings.
         """
         inertial = self.pipeline.inertial
         return inertial.settings is None or inertial.buffer.wait_for(timestamp, timeout)
@@ -366,7 +366,7 @@ class System:
         Parameters
         ----------
         source : sequence, or iterable of frames
-            As from `orbslam2py.open_sequence`, or whatever gives frames with a ``timestamp`` and
+            As from `orbslam2py.open_sequence`, or any iterable of frames with a ``timestamp`` and
             ``images``: a camera, ``itertools.islice(sequence, 100)``. A mask that comes with the
             images is used, and the samples of ``imu`` if the system knows the IMU.
         details : bool
@@ -430,7 +430,7 @@ class System:
     ) -> FullAdjustmentRecord:
         """Run full bundle adjustment of a map now: all keyframes and points together.
 
-        Tracking may continue meanwhile. Ctrl-C stops it and leaves the map as it was. A loop
+        Tracking may continue in parallel. Ctrl-C stops it and leaves the map as it was. A loop
         closure, another call, a reset, the shutdown and a switch to localization mode stop it too.
 
         Parameters
@@ -533,7 +533,7 @@ class System:
             errors.append(WorkerError(f"tracking did not end within {timeout} s"))
             ended = False
         if ended:
-            # Nobody else moves the frames any more.
+            # No other thread moves the frames now.
             self.pipeline.recorder.settle()
         try:
             self.pipeline.keeper.stop_autosave()
@@ -605,7 +605,7 @@ class System:
 
     @property
     def imu_check(self) -> ImuCheck | None:
-        """Whether the IMU fits the camera, as far as is known; None without IMU settings.
+        """Whether the IMU fits the camera, by the samples so far; None without IMU settings.
 
         `ImuCheck.verdict` is unknown at first; `ImuCheck.reason` says why its use is held back.
         """

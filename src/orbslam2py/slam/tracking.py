@@ -123,7 +123,7 @@ class Tracking:
         frames = self._initializer.remembered()
         self._begin_anew()
         if frames:
-            # The count of the frames goes on, and the next map is young as well.
+            # The count of the frames continues, and the next map is new as well.
             self._state = self._state.map_begun(frames[-1].id)
         self._initializer.restart(frames)
 
@@ -175,7 +175,7 @@ class Tracking:
         return self._state.n_relocalizations
 
     def feature_factor(self, *, localize: bool) -> int:
-        """Features that a single camera's next image needs, in multiples of the settings'.
+        """Factor on the number of features in the settings, for a single camera's next image.
 
         In localization mode no other thread needs the processor, and more features match more of
         the map. The same holds for a camera that is lost, or nearly lost. But more features are
@@ -235,7 +235,7 @@ class Tracking:
         localize : bool
             Pose only: no keyframes, no new points.
         details : bool
-            The outcome is to say which keypoints the pose was accepted with.
+            The result also contains the keypoints that the pose was accepted with.
         interval : ImuInterval or None
             Samples of the IMU since the frame before.
         """
@@ -278,7 +278,7 @@ class Tracking:
             self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
         if self._inertial is not None:
             self._inertial.tracked(frame, estimate)
-        # Before temporary points go, and a keyframe's keypoints become points.
+        # Computed before temporary points are dropped and keypoints of a keyframe become points.
         inliers = accepted_keypoints(frame) if details else None
         is_keyframe = False
         if localize:
@@ -312,7 +312,7 @@ class Tracking:
         frame_id, timestamp
             Number and time [s] of the frame.
         details : bool
-            The outcome is to say which keypoints the pose was accepted with.
+            The result also contains the keypoints that the pose was accepted with.
 
         Returns
         -------
@@ -363,7 +363,7 @@ class Tracking:
             self._state = replace(self._state, kept_maps=kept)
         estimate, state = self._search_once(frame, self._state, timer, localize)
         if not estimate.found and self._map.big_change_index != changes_before:
-            # A loop was closed meanwhile: what was matched may be half of the old map.
+            # A loop was closed in between: some matches may be with the old map.
             frame.clear_associations()
             estimate, state = self._search_once(frame, state, timer, localize)
         self._state = state
@@ -451,8 +451,8 @@ class Tracking:
         candidate = self._state.keyframe_candidate
         self._state = replace(self._state, keyframe_candidate=None)
         if candidate is not None:
-            # Relocalized, and confirmed by now. Where the map ends it sees more of it than any
-            # frame after it.
+            # The relocalized frame is confirmed now. At the border of the map, it sees more of the
+            # map than later frames.
             self._create_keyframe(candidate)
         allowed, self._state = self._acceptance.allows_keyframe(estimate.evidence, self._state)
         if not (allowed and self._keyframe_wanted(frame, estimate)):
@@ -461,7 +461,7 @@ class Tracking:
             self._state = replace(self._state, keyframe_candidate=frame)
             return False
         if estimate.evidence is not None and estimate.evidence.doubted:
-            # Bundle adjustment, which tries them again, would have few inliers to tell them by.
+            # Bundle adjustment checks them again, but would have few inliers for that.
             frame.discard_outliers()
         self._create_keyframe(frame)
         if self._inertial is not None:

@@ -15,7 +15,7 @@ from orbslam2py.slam.records import FrameFeatures, TrackingRecord
 
 
 class Tracker(Protocol):
-    """What a watched frame needs from tracking."""
+    """The part of tracking that a watched frame reads."""
 
     @property
     def local_points(self) -> IntArray: ...  # noqa: D102
@@ -106,7 +106,7 @@ def frame_features(
     frame : orbslam2py._core.TrackedFrame
         The frame.
     inliers : array of bool, (n,), optional
-        `accepted_keypoints` from before points were created or dropped.
+        `accepted_keypoints` of the frame before points were created or dropped.
     """
     features = frame.features
     return FrameFeatures(

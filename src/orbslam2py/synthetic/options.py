@@ -225,7 +225,7 @@ class SyntheticOptions:
             raise SettingsError(f"lens_pair is {shown(pair)}; give Settings of a raw pair")
         if self.size is not None or self.lens is not None:
             raise SettingsError(
-                "lens_pair (--lens) tells size and lenses of both cameras; leave size and lens out"
+                "lens_pair (--lens) sets size and lenses of both cameras; leave size and lens out"
             )
         if self.blur or self.imu:
             raise SettingsError("a raw pair (--lens) goes without blur and imu; leave them out")

@@ -83,7 +83,7 @@ def read_frame_table(path: str | Path) -> FrameTable:
     except (KeyError, TypeError, ValueError, csv.Error):
         raise DatasetError(
             f"{path}:{len(rows) + 2}: no row of a run's frames (index, timestamp, map, state); "
-            "move the file away, or write it anew with orbslam2py run"
+            "move the file away, or write it again with orbslam2py run"
         ) from None
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     last = table[:, 2].max(initial=0)

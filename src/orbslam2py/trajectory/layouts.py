@@ -56,7 +56,7 @@ TRAJECTORY_LAYOUTS = (
     TrajectoryLayout(
         "table with a head",
         "pandas, spreadsheets, rostopic echo -p",
-        "The names of the columns tell their order: time or timestamp; x, tx, px or position.x; "
+        "The names of the columns give their order: time or timestamp; x, tx, px or position.x; "
         "qx, q_x or orientation.x. Further columns are left out. Blanks, tabs, commas or "
         "semicolons separate.",
         "num,t,x,y,z,qx,qy,qz,qw\n0,1700000000.25,1.0,2.0,3.0,0.0,0.0,0.70710678,0.70710678\n",
@@ -65,7 +65,7 @@ TRAJECTORY_LAYOUTS = (
     TrajectoryLayout(
         "TUM with further columns",
         "OpenVINS with covariances, RTAB-Map (--poses_format 11)",
-        "What follows the eighth column is left out. OpenVINS writes JPL's quaternion of the world "
+        "Columns after the eighth are ignored. OpenVINS writes JPL's quaternion of the world "
         "in the body; its numbers are those of the usual one of the body in the world.",
         "#timestamp x y z qx qy qz qw id\n"
         "1700000000.25 1.0 2.0 3.0 0.0 0.0 0.70710678 0.70710678 7\n",

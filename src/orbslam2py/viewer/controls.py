@@ -166,7 +166,7 @@ class SystemControls:
             self._localization = gui.add_checkbox(
                 "Localization",
                 False,
-                hint="Poses only: the map stays as it is.",
+                hint="Poses only: the map does not change.",
             )
             optimize = gui.add_button("Optimize", hint="Refine all keyframes and points together.")
             reset = gui.add_button("Reset", color="red", hint="Begin a new map.")

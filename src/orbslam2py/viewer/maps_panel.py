@@ -13,7 +13,9 @@ from orbslam2py._palette import map_colour
 if TYPE_CHECKING:
     import viser
 
-_NOTE = "Maps that have not met are worlds of their own: how one lies beside another means nothing."
+_NOTE = (
+    "Maps that are not merged have their own world frames: their relative position has no meaning."
+)
 
 
 @dataclass(frozen=True)

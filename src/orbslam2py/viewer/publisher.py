@@ -304,7 +304,7 @@ class Publisher:
 
     def _leave_out(self, watcher: Watcher, error: Exception) -> None:
         _log.warning(
-            "%s stopped: %s; the run goes on without it", watcher.name, describe_error(error)
+            "%s stopped: %s; the run continues without it", watcher.name, describe_error(error)
         )
         _log.debug("in full:", exc_info=error)
         with self._condition:

@@ -61,8 +61,9 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
         _log.warning("port %d is taken: the viewer is at port %d", DEFAULT_PORT, chosen)
     if not _is_loopback(host):
         _log.warning(
-            "the viewer listens at %s: whoever reaches this computer over the network sees the "
-            "images and can use every button; without --viewer-host it is seen from here only",
+            "the viewer listens at %s: everyone who reaches this computer over the network sees "
+            "the images and can use every button; without --viewer-host only this computer can "
+            "open it",
             host,
         )
     import viser  # noqa: PLC0415

@@ -106,7 +106,7 @@ def test_resume(sequences: Path, whole: Whole, tmp_path: Path) -> None:
     (folder / "runs" / half / "row.json").unlink()
     (folder / "runs" / half / "trajectory.txt").write_text("half a line")
     before = (folder / "runs" / finished / "row.json").stat().st_mtime_ns
-    with pytest.raises(orb.DatasetError, match="holds a batch already; go on with --resume"):
+    with pytest.raises(orb.DatasetError, match="holds a batch already; continue with --resume"):
         orb.batch(jobs_of(sequences), folder, workers=0)
     ran: list[str] = []
     resumed = orb.batch(

@@ -101,7 +101,11 @@ def test_results(bucket: str, data: Path, plain: Path, tmp_path: Path) -> None:
         assert {path.name for path in here.iterdir()} == {path.name for path in there.iterdir()}
         for name in ("trajectory.txt", "points.ply", "keyframes.txt"):
             assert (here / name).read_bytes() == (there / name).read_bytes()
-    with pytest.raises(orb.DatasetError, match=r"night holds a batch already; go on with --resume"):
+    with pytest.raises(
+        orb.DatasetError,
+        match=r"night holds a batch already; continue with "
+        r"--resume",
+    ):
         orb.batch(document, place, workers=0)
     files, root = fsspec.core.url_to_fs(place)
     lost = done.rows[1]["run"]

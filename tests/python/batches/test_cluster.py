@@ -159,7 +159,9 @@ def test_the_scheduler_is_lost(
 ) -> None:
     cluster.require(1)
     monkeypatch.setattr(engine, "_PATIENCE", 1.0)
-    with pytest.raises(orb.DatasetError, match="the scheduler was lost; start it again, and go on"):
+    with pytest.raises(
+        orb.DatasetError, match="the scheduler was lost; start it again, and continue"
+    ):
         orb.batch(
             jobs(folder, 3),
             tmp_path / "out",

@@ -98,7 +98,7 @@ def require_well_ended(folder: Path, code: int, errors: str) -> None:
     assert len(list((folder / "runs").iterdir())) == len(rows)
     n_left = N - len(rows)
     left = "1 run is left" if n_left == 1 else f"{n_left} runs are left"
-    assert f"{left}; go on with --resume" in errors
+    assert f"{left}; continue with --resume" in errors
     assert "Traceback" not in errors
 
 

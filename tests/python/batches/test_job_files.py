@@ -68,7 +68,8 @@ def test_parts_that_are_shared(places: Path) -> None:
         ("sequences: [a]\n? [1]\n: 2\n", r"jobs.yaml:2 is no YAML: found unhashable key"),
         (
             "sequences: [a, 2024-13-45]\n",
-            r"jobs.yaml is no YAML: month must be in 1..12; put what is no date into quotes",
+            r"jobs.yaml is no YAML: month must be in 1..12; put text that looks like a date "
+            r"into quotes",
         ),
         ("sequences: \0\n", "jobs.yaml is no text in YAML; give a job file"),
     ],

@@ -59,7 +59,7 @@ def test_aria_is_fitted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> Non
 
 
 def test_wrong_files_of_aria_and_woodscape(tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match=r"does not tell the size .* give it with --size"):
+    with pytest.raises(SettingsError, match=r"does not contain the size .* give it with --size"):
         read_camera_file(written(tmp_path, ARIA))
     wild = json.loads(json.dumps(WOODSCAPE))
     del wild["intrinsic"]["k3"]

@@ -40,7 +40,7 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
     ("text", "options", "message"),
     [
         (OPENCV, {"sensor": "stereo", "baseline": 0.1}, "must be rectified"),
-        (KALIBR_PAIR, {"sensor": "stereo", "baseline": 0.1}, "tells the baseline, 0.11 m"),
+        (KALIBR_PAIR, {"sensor": "stereo", "baseline": 0.1}, "contains the baseline, 0.11 m"),
         (KALIBR_PAIR, {"depth_factor": 1000}, "leave it out for stereo"),
         (KALIBR, {"depth_factor": 1000}, "leave it out for mono"),
         (ROS, {"sensor": "rgbd", "right": "right.yaml"}, "leave --right out for rgbd"),
@@ -67,7 +67,7 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
         (
             KALIBR_PAIR.replace("0.0, -0.11", "0.0, 0.0"),
             {},
-            r"yaml: the pair cannot be rectified, because cam0 and cam1 stand in one place.*"
+            r"yaml: the pair cannot be rectified, because cam0 and cam1 have the same position.*"
             r"look at T_cn_cnm1, or take one of them with --camera 0",
         ),
     ],

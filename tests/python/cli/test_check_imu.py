@@ -79,7 +79,7 @@ def test_a_table_beside_the_recording(command, made, tmp_path):
         (["--gyro-unit", "deg/s"], ["--gyro-unit", "--imu"]),
         (["--plot", "a.docx"], ["--plot a.docx", ".png"]),
         (["--plot", "kept.png"], ["kept.png exists", "--force"]),
-        (["--imu-settings", "wrong.csv"], ["wrong.csv", "tells nothing about an IMU"]),
+        (["--imu-settings", "wrong.csv"], ["wrong.csv", "contains nothing about an IMU"]),
         (
             ["--imu-settings", "half.yaml", "--imu-noise", "bmi1"],
             ["bmi1", "adis16448"],

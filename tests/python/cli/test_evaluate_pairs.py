@@ -119,7 +119,7 @@ def test_frame_numbers_stand_for_times(
     write_kitti(tmp_path / "poses.txt", truth)
     figures, done = compared(command, "run/trajectory_kitti.txt", "poses.txt")
     expect_right(figures, len(range(start, N, stride)) - 12)
-    assert "by number of the frame, as frames.csv tells it" in done.out
+    assert "by number of the frame, as in frames.csv" in done.out
     assert "Left out: 12 rows" in done.out
 
 

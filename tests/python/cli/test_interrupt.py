@@ -143,7 +143,7 @@ def test_once(
     assert report["seen_frames"] == len(rows)
     assert report["frames"] == N
     if report["interrupted"]:
-        assert f"interrupted; saving what was done so far ({len(rows)} of {N} frames)" in err
+        assert f"interrupted; saving the results so far ({len(rows)} of {N} frames)" in err
     else:
         assert len(rows) == N
     if module == "orbslam2py._core" and name == "match_local_map":

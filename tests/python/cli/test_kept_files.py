@@ -256,7 +256,7 @@ def test_figures_replace_figures_only(command: CommandLine, finished: Path, rgbd
     arguments = ("evaluate", finished / "trajectory.txt", rgbd, "--json")
     refused(
         command(*arguments, finished / "report.json"),
-        "r/report.json exists and holds something else than figures",
+        "r/report.json exists and does not hold figures",
     )
     assert (finished / "report.json").read_bytes() == report
     Path("list.json").write_text("[1, 2]")

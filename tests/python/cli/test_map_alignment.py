@@ -88,7 +88,7 @@ def test_wrong_images_are_refused(command: CommandLine, room: Path, changed: str
     expected = {
         "size": "has 300 x 200 pixels, but its camera has 320 x 240",
         "time": "no image of the sequence has the time stamp of a keyframe",
-        "place": "they show something else than the map",
+        "place": "they do not show the map",
         "missing": ".png",
     }
     assert expected[changed] in err

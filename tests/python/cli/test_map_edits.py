@@ -115,7 +115,7 @@ def test_points_on_a_line(command: CommandLine, tmp_path: Path) -> None:
     file = map_file(tmp_path)
     done = command("map", "align", file, "-o", "b.orbmap", "--points", "points.txt")
     assert done.code == 2
-    assert "the known points lie on a line in the map, so how far" in done.err
+    assert "the known points lie on a line in the map, so the rotation" in done.err
     assert not Path("b.orbmap").exists()
 
 
@@ -128,7 +128,7 @@ def test_a_straight_true_path(command: CommandLine, tmp_path: Path) -> None:
     file = map_file(tmp_path, saved)
     done = command("map", "align", file, "-o", "b.orbmap", "--truth", "truth.txt")
     assert done.code == 0
-    assert "They lie on a line, so the turn around it is not known" in done.out
+    assert "They lie on a line, so the rotation about it is not determined" in done.out
 
 
 @pytest.mark.filterwarnings("error")

@@ -79,7 +79,12 @@ WRONG = {
     "no samples": (["--imu"], ["imu.csv"], "has no samples of an IMU", "--imu-samples FILE"),
     "no file": (["--imu-settings", "none.yaml"], [], "none.yaml", "check the path"),
     "no table": (["--imu-samples", "none.csv"], [], "none.csv", "check the path"),
-    "no IMU file": (["--imu-settings", "made/rgb.txt"], [], "tells nothing about an IMU", "Kalibr"),
+    "no IMU file": (
+        ["--imu-settings", "made/rgb.txt"],
+        [],
+        "contains nothing about an IMU",
+        "Kalibr",
+    ),
     "no chip": (["--imu-settings", "made/imu.yaml", "--imu-noise", "xyz1"], [], "xyz1", "bmi088"),
     "unit alone": (["--accel-unit", "g"], [], "--accel-unit", "give it, or leave"),
     "table without": (
@@ -92,7 +97,7 @@ WRONG = {
     "two of one": (
         2 * ["--imu-samples", "made/imu.csv"],
         [],
-        "neither its header nor its name tells",
+        "neither its header nor its name says",
         "name the file gyro.csv or accelerometer.csv",
     ),
     "wrong unit": (

@@ -37,7 +37,9 @@ def test_nothing_tells_the_settings_of_tum(tum: Path, sensor: str) -> None:
     with pytest.raises(DatasetError) as caught:
         _ = sequence.settings
     text = str(caught.value)
-    assert text.startswith(f"no settings for {tum.with_name('kitchen')}: its name does not tell")
+    assert text.startswith(
+        f"no settings for {tum.with_name('kitchen')}: its name does not identify"
+    )
     for name, camera in (("tum1", "freiburg1"), ("tum2", "freiburg2"), ("tum3", "freiburg3")):
         assert f"{name} (" in text
         assert camera in text
@@ -79,5 +81,5 @@ def test_name_of_a_link_tells_the_camera(tum: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("name", ["frames1", "afr1", "fr12", "freiburg4", "desk_1"])
 def test_other_names_tell_no_camera(tum: Path, name: str) -> None:
-    with pytest.raises(DatasetError, match="does not tell the camera"):
+    with pytest.raises(DatasetError, match="does not identify the camera"):
         _ = open_sequence(tum.rename(tum.with_name(name))).settings

@@ -137,7 +137,7 @@ def test_half_of_a_pair(tmp_path: Path, half: str) -> None:
 
 def test_settings_are_asked_for(tmp_path: Path) -> None:
     folder = phone(tmp_path / "p", names("color/%d.png", 2), names("depth/%d.png", 2))
-    with pytest.raises(DatasetError, match="nothing tells what camera it is from; give --settings"):
+    with pytest.raises(DatasetError, match="its camera is unknown; give --settings"):
         open_sequence(folder)
 
 

@@ -47,6 +47,6 @@ def test_two_cameras_in_one_place(tmp_path: Path) -> None:
     with pytest.raises(DatasetError) as refused:
         _ = open_sequence(folder, Sensor.STEREO).settings
     assert str(refused.value) == (
-        f"{left}: the two cameras of the pair stand in one place, so they see no depth; look at "
-        "where their calibration puts them, or use one of them (--sensor mono)"
+        f"{left}: the two cameras of the pair have the same position, so they measure no depth; "
+        "check where their calibration puts them, or use one of them (--sensor mono)"
     )

@@ -111,7 +111,7 @@ def test_an_unknown_order_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixtu
     samples = read_gopro_imu(path)
     assert samples is not None
     np.testing.assert_allclose(samples.gyro, gyro, atol=0.5 / 939)
-    assert "does not tell the order of the axes" in caplog.text
+    assert "does not contain the order of the axes" in caplog.text
 
 
 def test_other_videos_have_no_samples(tmp_path: Path) -> None:

@@ -204,7 +204,7 @@ def test_two_tables_of_a_phone(tmp_path, app):
     ("names", "headers", "message"),
     [
         (("gyro", "gyro2"), ("t,x,y,z", "t,x,y,z"), "both tables of the gyro"),
-        (("a", "accel"), ("t,x,y,z", "t,x,y,z"), "neither its header nor its name tells"),
+        (("a", "accel"), ("t,x,y,z", "t,x,y,z"), "neither its header nor its name says"),
         (("gyro", "accel"), ("t,x,y,z", "t,x,y,w"), "names no column z"),
         (("gyro", "accel"), ("a,x,y,z", "t,x,y,z"), "names no column time"),
         (("gyro", "accel"), ("", "t,x,y,z"), "names no column time, x, y, z"),

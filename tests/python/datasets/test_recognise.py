@@ -25,7 +25,7 @@ def test_folders_that_are_no_sequence(tum: Path, tmp_path: Path) -> None:
         open_sequence(tum / "rgb.txt")
     with pytest.raises(DatasetError, match=r"looked for rgb\.txt .*did you mean .*freiburg2"):
         open_sequence(tum.parent)
-    with pytest.raises(DatasetError, match="no sequence we know"):
+    with pytest.raises(DatasetError, match="no known sequence"):
         open_sequence(tum / "rgb")
 
 

@@ -137,7 +137,7 @@ def test_settings_of_the_calibration() -> None:
 
 
 def test_wrong_cameras(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(DatasetError, match="oak:12 tells no calibration"):
+    with pytest.raises(DatasetError, match="oak:12 has no calibration"):
         oak_calibration.settings_of(dai.CalibrationHandler(), "oak:12", Sensor.STEREO, SIZE, 30)
     if dai.Device.getAllAvailableDevices():
         pytest.skip("a camera is plugged in")

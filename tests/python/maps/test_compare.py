@@ -98,4 +98,4 @@ def test_minus_zero_is_not_zero() -> None:
         for p in (positions, -positions)
     )
     (line,) = map_differences(zero, minus)
-    assert line == "points.positions: bits of zeros or of what is no number"
+    assert line == "points.positions: bits of zeros or of NaN"

@@ -149,7 +149,7 @@ def test_the_command_merges_and_tells(
     assert "map 1 is part of map 0 now" in told
     assert "2 maps of" in told
     told = call("map", "info", target).out
-    assert "each in a world of its own" in told
+    assert "each in its own world frame" in told
     assert "map 1 " in told
     assert "in 2 maps" in call("map", "verify", target).out
     part = str(tmp_path / "part.orbmap")

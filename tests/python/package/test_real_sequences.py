@@ -97,7 +97,7 @@ def test_euroc_ground_truth_is_the_one_of_cam0(shared_data: Path) -> None:
 
 
 def test_plain_images_are_no_sequence(shared_data: Path) -> None:
-    with pytest.raises(DatasetError, match="no sequence we know"):
+    with pytest.raises(DatasetError, match="no known sequence"):
         open_sequence(shared_data / "sequences" / "rtabmap_samples_loop")
 
 

@@ -271,6 +271,6 @@ def test_several_imus_must_be_named(nodes: Nodes) -> None:
     _add_pair(nodes)
     for name in ("/imu_a", "/imu_b"):
         nodes.add(name, IMU, imu(START, (0.0,) * 3, (0.0, 0.0, 9.8)))
-    with pytest.raises(DatasetError, match=r"cannot tell which .*: --topics imu=/imu_a"):
+    with pytest.raises(DatasetError, match=r"cannot decide which .*: --topics imu=/imu_a"):
         nodes.open(imu=True)
     assert nodes.open(topics="imu=/imu_b").streams == ("left", "right", "imu")

@@ -291,7 +291,7 @@ def test_check_calibration_of_frames_needs_settings() -> None:
     with pytest.raises(orb.SettingsError, match="an islice has no settings; give them"):
         check_calibration(frames)
     with pytest.raises(
-        orb.SettingsError, match=r"tell its sensor.*Settings.load\('tum1', sensor\)"
+        orb.SettingsError, match=r"name its sensor.*Settings.load\('tum1', sensor\)"
     ):
         check_calibration(frames, "tum1")
 

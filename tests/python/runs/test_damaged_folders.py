@@ -67,7 +67,7 @@ def test_a_table_that_is_cut_within_a_line(run: Path) -> None:
 def test_a_table_that_is_cut_after_a_line(run: Path) -> None:
     lines = (run / "frames.csv").read_text().splitlines(keepends=True)
     (run / "frames.csv").write_text("".join(lines[:10]))
-    assert "frames.csv holds 9 frames, but report.json tells of 26" in refusal(run)
+    assert "frames.csv holds 9 frames, but report.json has 26" in refusal(run)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_path_that_is_empty_or_cut(run: Path) -> None:
     lines = (run / "trajectory.txt").read_text().splitlines(keepends=True)
     for n in (0, 7):
         (run / "trajectory.txt").write_text("".join(lines[:n]))
-        assert f"trajectory.txt holds {n} poses, but report.json tells of 24" in refusal(run)
+        assert f"trajectory.txt holds {n} poses, but report.json has 24" in refusal(run)
 
 
 def test_what_an_older_report_does_not_tell_is_not_asked_for(run: Path) -> None:

@@ -132,7 +132,7 @@ def test_any_run_has_a_page(tmp_path: Path, states: str, how: dict[str, object])
         assert [f"map-{number}" in page.ids for number in range(5)] == [True] * 5
         assert "plot-maps" in page.ids
         assert "Map 4, the main one" in page.text
-        assert "where one lies beside another means nothing" in page.text
+        assert "relative position of two maps has no meaning" in page.text
     if "maps" not in how:
         assert "maps" not in page.ids, "nothing is said of several maps where there is one"
 

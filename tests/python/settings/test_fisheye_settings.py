@@ -175,7 +175,7 @@ def test_no_pair() -> None:
         lambda: settings_for_camera(TUMVI, "stereo", baseline=0.1),
         lambda: replace(settings_for_camera(TUMVI, "rgbd"), sensor=Sensor.STEREO),
     ):
-        with pytest.raises(SettingsError, match=r"needs both cameras and how they stand: Camera2"):
+        with pytest.raises(SettingsError, match=r"needs both cameras and their relative pose: Cam"):
             make()
 
 

@@ -140,8 +140,8 @@ def test_wrong_matrices_are_named(tmp_path, change, message):
 @pytest.mark.parametrize(
     ("files", "message"),
     [
-        ({"a.yaml": ORB}, "no key tells where the IMU stands"),
-        ({"a.yaml": "Camera.fx: 500\n"}, "tells nothing about an IMU"),
+        ({"a.yaml": ORB}, "no key gives the pose of the IMU"),
+        ({"a.yaml": "Camera.fx: 500\n"}, "contains nothing about an IMU"),
         ({"a.json": '{"value0": {}}'}, "no calibration of Basalt"),
         (
             {"a.yaml": ORB.replace("1e-3 #", "-1e-3 #") + matrix("Tbc", T_BC)},

@@ -90,7 +90,7 @@ def in_place(T: FloatArray) -> FloatArray:
         ),
         (scaled, "T_rl is no rigid transform; give 4 x 4 numbers: a rotation and a translation"),
         (upright, "T_rl the cameras stand one above the other, and a pair must stand side by"),
-        (in_place, "the two cameras of the pair stand in one place, so they see no depth; look"),
+        (in_place, "the two cameras of the pair have the same position, so they measure no depth;"),
     ],
 )
 def test_extrinsics_that_cannot_be(degrees: float, change: object, told: str) -> None:
@@ -114,5 +114,5 @@ def test_a_pair_is_rectified_or_has_a_right_camera() -> None:
         replace(wide, rectification=flat.rectification)
     with pytest.raises(SettingsError, match="T_left_right is no rigid transform"):
         RightCamera(fisheye(150), np.ones((4, 4)))
-    with pytest.raises(SettingsError, match="needs both cameras and how they stand"):
+    with pytest.raises(SettingsError, match="needs both cameras and their relative pose"):
         replace(wide, right=None)

@@ -59,7 +59,7 @@ def test_settings_without_a_raw_pair() -> None:
     settings = distorted_pair()
     for options, told in (
         ({"sensor": "mono"}, "lens_pair is for the sensor stereo; give lens for one camera"),
-        ({"size": (320, 240)}, "tells size and lenses of both cameras; leave size and lens out"),
+        ({"size": (320, 240)}, "sets size and lenses of both cameras; leave size and lens out"),
         ({"blur": 0.5}, "goes without blur and imu; leave them out"),
         ({"lens_pair": "euroc"}, "lens_pair is 'euroc'; give Settings of a raw pair"),
     ):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The page's process: ends with the run's, whatever ends it; the run goes on without it."""
+"""The page's process: ends with the run's, whatever ends it; the run continues without it."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_when_it_is_killed_the_run_goes_on_with_one_warning(
     assert all(record.state is TrackingState.OK for record in records)
     said = [record.getMessage() for record in caplog.records]
     assert said == [
-        "the viewer stopped: its process was ended by SIGKILL; the run goes on without it"
+        "the viewer stopped: its process was ended by SIGKILL; the run continues without it"
     ]
 
 
@@ -185,7 +185,7 @@ def test_warnings_of_the_page_are_told_here(caplog: pytest.LogCaptureFixture) ->
         LiveView(host="0.0.0.0", port=0).stop()
     said = [record for record in caplog.records if record.name == "orbslam2py.viewer.server"]
     assert len(said) == 1
-    assert "whoever reaches this computer over the network" in said[0].getMessage()
+    assert "everyone who reaches this computer over the network" in said[0].getMessage()
 
 
 _RUN = """

@@ -129,7 +129,7 @@ def test_a_watcher_that_fails_is_left_out_with_one_warning(
     assert failing.n_closed == fine.n_closed == 1
     warnings = [record.getMessage() for record in caplog.records]
     assert warnings == [
-        "the notebook stopped: run.mp4: No space left on device; the run goes on without it"
+        "the notebook stopped: run.mp4: No space left on device; the run continues without it"
     ]
 
 

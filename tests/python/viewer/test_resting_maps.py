@@ -108,7 +108,7 @@ def test_resting_maps_lie_beside_the_active_one(system: System, sequence: Cut) -
         for text in (
             f"map 1, active: {len(own.keyframe_ids)} keyframes",
             f"map 0, rests: {len(other.keyframe_ids)} keyframes, {len(other.point_ids)} points",
-            "worlds of their own",
+            "their own world frames",
             "1 other map at rest",
         ):
             page.wait_for(f"document.body.innerText.includes({text!r})", 60)

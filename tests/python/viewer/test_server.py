@@ -81,7 +81,7 @@ def test_who_listens_to_the_network_is_told_once_what_that_means(
         stop_server(server)
     warnings = [r.getMessage() for r in caplog.records if r.name.startswith("orbslam2py")]
     assert len(warnings) == 1
-    assert "whoever reaches this computer over the network sees the images" in warnings[0]
+    assert "everyone who reaches this computer over the network sees the images" in warnings[0]
 
 
 def test_without_viser_the_line_that_installs_it_is_named(

@@ -137,7 +137,7 @@ def _paths(entry: Entry, folder: Path, name: str) -> Markup | None:
         try:
             run = read_run(folder / "runs" / str(row["run"]))
         except DatasetError:
-            continue  # the table of all runs says what became of it
+            continue  # the table of all runs says how it ended
         if len(run.path):
             runs.append(run)
             seeds.append(row["seed"])

@@ -50,7 +50,7 @@ class Published:
 def published_figures(
     kind: StandardSet | str, sequence: str, sensor: str, *, imu: bool = False
 ) -> list[Published]:
-    """Return what papers tell of a sequence; nothing where no figure is given.
+    """Return the published results of a sequence; nothing where no figure is given.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ _OAK_LENSES = {"0": PINHOLE, "1": "kannala_brandt", "2": "equirectangular", "3":
 
 
 def read_oak(source: CalibrationSource) -> CameraFile:
-    """Read the cameras of all sockets; each tells where another one stands, in centimetres."""
+    """Read the cameras of all sockets; each has the position of another one, in centimetres."""
     cameras: dict[int, Mapping[str, Any]] = {}
     listed = source.value("cameraData")
     for entry in listed if isinstance(listed, list) else [listed]:
@@ -78,7 +78,7 @@ def _pairs(source: CalibrationSource, sockets: list[int]) -> tuple[tuple[int, in
 def _places(
     source: CalibrationSource, cameras: Mapping[int, Mapping[str, Any]]
 ) -> dict[int, FloatArray]:
-    """Chain what the cameras tell of each other, as seen from the lowest socket."""
+    """Chain the relative poses of the cameras, beginning at the lowest socket."""
     links: dict[tuple[int, int], FloatArray] = {}
     for socket, values in cameras.items():
         given = values.get("extrinsics")

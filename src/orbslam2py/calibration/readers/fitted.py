@@ -174,8 +174,8 @@ def read_aria(source: CalibrationSource) -> CameraFile:
     listed = source.mappings(source.value("CameraCalibrations"), "CameraCalibrations")
     if source.size is None:
         raise SettingsError(
-            f"{source.path} is a calibration of Project Aria, which does not tell the size of the "
-            "images; give it with --size WIDTHxHEIGHT"
+            f"{source.path} is a calibration of Project Aria, which does not contain the size "
+            "of the images; give it with --size WIDTHxHEIGHT"
         )
     cameras, notes = [], []
     for number, values in enumerate(listed):

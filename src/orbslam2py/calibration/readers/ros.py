@@ -34,7 +34,7 @@ _R, _P = ("rectification_matrix", "R", "r"), ("projection_matrix", "P", "p")
 
 
 def read_camera_info(source: CalibrationSource) -> CameraFile:
-    """Read the raw camera, for images as they come: of the region of interest, and binned."""
+    """Read the raw camera, for unrectified images after region of interest and binning."""
     path, values = source.path, source.values
     model = values.get("distortion_model", "plumb_bob") or "plumb_bob"
     lens = lens_of(f"{path}", "distortion_model", model)

@@ -104,7 +104,7 @@ def named_lens(
 
 # ---- EuRoC ---------------------------------------------------------------------------------------
 def read_euroc(source: CalibrationSource) -> CameraFile:
-    """Read a sensor.yaml; T_BS tells where the camera stands on the vehicle."""
+    """Read a sensor.yaml; T_BS is the pose of the camera on the vehicle."""
     path, values = source.path, source.values
     lens = lens_of(f"{path}", "camera_model", values.get("camera_model", "pinhole"))
     if lens == PINHOLE:
@@ -199,7 +199,7 @@ def read_stella(source: CalibrationSource) -> CameraFile:
 
 # ---- Basalt --------------------------------------------------------------------------------------
 def read_basalt(source: CalibrationSource) -> CameraFile:
-    """Read all cameras; T_imu_cam tells where they stand."""
+    """Read all cameras; T_imu_cam is their pose."""
     path = source.path
     inner = source.mapping(source.value("value0"), "value0")
     intrinsics = source.mappings(source.value("intrinsics", inner, "value0."), "value0.intrinsics")
@@ -248,7 +248,7 @@ def _pose(source: CalibrationSource, values: Mapping[str, Any], where: str) -> F
 
 # ---- Fisheye-Calib-Adapter -----------------------------------------------------------------------
 def read_fca(source: CalibrationSource) -> CameraFile:
-    """Read a camera of the Fisheye-Calib-Adapter, whose keys tell the lens."""
+    """Read a camera of the Fisheye-Calib-Adapter, whose keys determine the lens model."""
     image = source.mapping(source.value("image"), "image")
     sides = [source.value(side, image, "image.") for side in ("width", "height")]
     values = source.mapping(source.value("parameter"), "parameter")
@@ -262,7 +262,7 @@ def read_fca(source: CalibrationSource) -> CameraFile:
 
 
 def lens_by_keys(values: Mapping[str, Any]) -> str:
-    """Tell a lens by the names of its numbers."""
+    """Return the lens model that has parameters of these names."""
     if "alpha" in values and ("xi" in values or "beta" in values):
         return "double_sphere" if "xi" in values else "eucm"
     if "xi" in values:

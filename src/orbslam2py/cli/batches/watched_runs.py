@@ -86,7 +86,7 @@ def exit_as_it_ended(done: BatchResult, errors: Console) -> None:
     if done.n_left:
         verb = "is" if done.n_left == 1 else "are"
         errors.print(
-            f"{number_of(done.n_left, 'run')} {verb} left; go on with --resume", highlight=False
+            f"{number_of(done.n_left, 'run')} {verb} left; continue with --resume", highlight=False
         )
         raise typer.Exit(ExitCode.INTERRUPTED)
     if done.n_failed:

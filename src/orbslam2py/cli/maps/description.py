@@ -36,7 +36,7 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
     yield "vocabulary", f"{words.hash}{f' ({words.name})' if words.name else ''}"
     numbers = map_numbers(keyframes)
     if numbers.max() > 0:
-        yield "maps", f"{numbers.max() + 1}, each in a world of its own"
+        yield "maps", f"{numbers.max() + 1}, each in its own world frame"
         for number in range(int(numbers.max()) + 1):
             yield f"map {number}", _one_map(saved, numbers == number)
     yield "keyframes", f"{len(keyframes)} ({len(contents.removed_keyframes)} were culled)"

@@ -330,7 +330,7 @@ def _described(placement: Placement, contents: MapContents) -> list[str]:
         )
     if placement.on_a_line:
         lines.append(
-            "They lie on a line, so the turn around it is not known; points beside it would tell"
+            "They lie on a line, so the rotation about it is not determined; add points beside it"
         )
     return lines
 

@@ -63,7 +63,7 @@ _PATHS = (ExportFormat.TUM, ExportFormat.KITTI, ExportFormat.EUROC)
 
 
 class ExportCommand(typer.core.TyperCommand):
-    """Tells users who give the format as an option where it belongs."""
+    """Tells users that the format is an argument and no option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse ``--format``, which other commands have."""

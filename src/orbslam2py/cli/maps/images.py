@@ -26,5 +26,5 @@ def open_images(
         images, saved.sensor, settings=saved.settings, fps=fps, times=times, split=split
     )
     if not is_sequence(sequence):
-        raise DatasetError(f"--images {images} is a camera; give what it recorded")
+        raise DatasetError(f"--images {images} is a camera; give its recording")
     return sequence

@@ -29,9 +29,7 @@ def merge(
     vocabulary: VocabularyOption = None,
     full_adjustment: Annotated[
         bool,
-        typer.Option(
-            "--full-adjustment/--no-full-adjustment", help="Refine what has become one as a whole."
-        ),
+        typer.Option("--full-adjustment/--no-full-adjustment", help="Refine the merged map."),
     ] = True,
     force: Force = False,
     quiet: Quiet = False,

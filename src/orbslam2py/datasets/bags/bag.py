@@ -91,7 +91,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        #: What is wrong although it can be read: whole sentences.
+        #: Faults of a bag that can be read: whole sentences.
         self.doubts: list[str] = []
         paths = _files_of(path, self.doubts)
         self.layout = _kind_of(paths[0])[0]
@@ -220,7 +220,7 @@ def _listed_files(folder: Path, doubts: list[str]) -> list[Path]:
         found = _files_in(folder)
         if not found:
             raise DatasetError(
-                f"{path} is damaged, and no bag lies beside it; copy the folder anew"
+                f"{path} is damaged, and no bag lies beside it; copy the folder again"
             ) from error
         doubts.append(f"{path} is damaged; all bags in the folder are taken")
         return found

@@ -227,7 +227,7 @@ def settings_of_pair(
     if bf < 0:
         raise _exchanged(right.what)
     if not rectified and (left.is_fisheye or right.is_fisheye):
-        # P and R tell the same as a transform.
+        # P and R give the same as a transform.
         T = np.eye(4)
         T[:3, :3] = right.R.T @ left.R
         T[:3, 3] = right.R.T @ (-bf / left.rectified_K[0, 0], 0.0, 0.0)
@@ -260,14 +260,14 @@ def _settings_by_transform(
     distance = float(np.linalg.norm(at))
     if distance < 1e-6:
         raise DatasetError(
-            f"{left.what} and {right.what} do not tell the distance of the two cameras (both P "
+            f"{left.what} and {right.what} do not contain the distance of the two cameras (both P "
             "have the same last column), and no transform in the bag does; record it with "
             f"/tf_static, calibrate the cameras as a pair, or {_ADVICE}"
         )
     names = f"{left.what} and {right.what}"
     if abs(at[0]) < np.linalg.norm(at[1:]):
         raise DatasetError(
-            f"{names}: by the transform between them the cameras do not stand side by side (the "
+            f"{names}: by the transform between them the cameras are not side by side (the "
             f"right one is at {_metres(at)} from the left one), as a pair must; use one of them "
             "(--sensor mono)"
         )

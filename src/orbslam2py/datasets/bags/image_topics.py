@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A topic with images: its pixels, and the camera that its name tells."""
+"""A topic with images: its pixels, and the camera by its name."""
 
 from __future__ import annotations
 

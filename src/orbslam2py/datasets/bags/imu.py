@@ -48,7 +48,7 @@ def read_imu(bag: Bag) -> ImuSamples | None:
     if not whole:
         if topics:
             _log.warning(
-                "%s: the IMU is not used: cannot tell gyro and accelerometer of %s",
+                "%s: the IMU is not used: cannot distinguish gyro and accelerometer of %s",
                 *(bag.path, ", ".join(one.name for one in topics)),
             )
         return None

@@ -65,7 +65,7 @@ class McapFile:
         self.doubts: list[str] = []
         self._file = OpenFile(path)
         if self._file.read(0, len(MAGIC)) != MAGIC:
-            raise DatasetError(f"{path} is no MCAP file: it does not begin like one; copy it anew")
+            raise DatasetError(f"{path} is no MCAP file: it does not begin like one; copy it again")
         self._chunks: list[_Chunk] = []
         self._cache = ChunkCache(self._load_chunk)
         self._schemas: dict[int, str] = {}

@@ -64,8 +64,8 @@ def read_head(content: bytes, kind: str, encoding: str) -> Head:
     DatasetError
         If it is too short; the message does not name the bag.
     """
-    # ROS 1: sequence number, seconds, nanoseconds, text. CDR: four bytes that tell the byte order,
-    # the same without the number; the text ends with 0, and numbers are aligned to their size.
+    # ROS 1: sequence number, seconds, nanoseconds, text. CDR: four bytes with the byte order, the
+    # same without the number; the text ends with 0, and numbers are aligned to their size.
     ros1 = encoding == "ros1"
     order = "<" if ros1 or content[1:2] == b"\x01" else ">"
     try:

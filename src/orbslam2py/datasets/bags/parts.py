@@ -18,7 +18,7 @@ from orbslam2py.errors import DatasetError
 
 EntryT = TypeVar("EntryT")
 
-#: What comes of numbers, texts and fields that are not what the format says.
+#: Errors for numbers, texts and fields that violate the format.
 _DAMAGE = (struct.error, LookupError, ValueError, OverflowError, MemoryError)
 #: Chunks that are kept decompressed: the cameras' messages of one moment lie close together.
 _KEPT_CHUNKS = 4
@@ -102,7 +102,7 @@ def naming_damage(path: Path) -> Iterator[None]:
         raise DatasetError(f"{path}: {error}") from error
     except _DAMAGE as error:
         raise DatasetError(
-            f"{path} is damaged: a part of it is not what its format says; copy it anew"
+            f"{path} is damaged: a part of it is not what its format says; copy it again"
         ) from error
 
 

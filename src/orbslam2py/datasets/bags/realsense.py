@@ -105,7 +105,7 @@ def camera_times(
         missing = len(old.messages) - len(new.messages)
         if missing:
             _log.warning(
-                "%s: %s of %s without a time of the camera of its own, left out",
+                "%s: %s of %s without a time stamp of the camera, left out",
                 *(bag.path, number_of(missing, "image"), one.topic.name),
             )
     return retimed

@@ -23,7 +23,7 @@ def settings_of_topics(
     bag, topics
         The messages, and the topics of a run.
     sensor
-        What the images are for.
+        Sensor for which the images are used.
     frames
         Names of the cameras' coordinates in the heads of their messages, left first.
     fps

@@ -102,7 +102,7 @@ class SqliteFile:
             raise DatasetError(cannot_open(self.path, error)) from error
         if start != MAGIC:
             raise DatasetError(
-                f"{self.path} is no SQLite database: it does not begin like one; copy it anew"
+                f"{self.path} is no SQLite database: it does not begin like one; copy it again"
             )
         address = self.path.absolute().as_uri()
         # Read beside a program that writes it; where that is not allowed, as it lies there.
@@ -116,18 +116,18 @@ class SqliteFile:
                     database.close()
                     raise
                 except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-                    # Without it, a file that is shorter than its head says is not even looked at.
+                    # Without it, a file that is shorter than its header says cannot be opened.
                     database.execute("PRAGMA writable_schema = ON")
                     self._doubt(error)
                 return database
-        raise DatasetError(f"{self.path} is a database that cannot be opened; copy it anew")
+        raise DatasetError(f"{self.path} is a database that cannot be opened; copy it again")
 
     def _rows(self, query: str) -> list[tuple[Any, ...]]:
         try:
             return self._database.execute(query).fetchall()
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             raise DatasetError(
-                f"{self.path} is damaged or cut off ({_reason(error)}); copy it anew"
+                f"{self.path} is damaged or cut off ({_reason(error)}); copy it again"
             ) from error
 
     def _list_topics(self) -> None:

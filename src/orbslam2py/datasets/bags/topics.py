@@ -23,13 +23,13 @@ from orbslam2py.datasets.pair_names import side_of_pair
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.settings import Sensor
 
-#: What may be named, and by which other words.
+#: Roles that may be named, and other words for them.
 ROLES = ("left", "right", "depth", "left_info", "right_info", "depth_info", "truth")
 _ALIASES = {"image": "left", "color": "left", "colour": "left", "rgb": "left", "info": "left_info"}
 _ROLES_ARE = (
     "roles are image or left, right, depth, info or left_info, right_info, depth_info, truth"
 )
-#: The topic that is taken as the true poses of the camera if nobody names one.
+#: The topic that is used as ground truth by default.
 _TRUTH = "/ground_truth"
 _COLOUR = re.compile(r"rgb|colou?r", re.IGNORECASE)
 _REGISTERED = re.compile(r"regist|aligned|depth_to_(rgb|colou?r)", re.IGNORECASE)
@@ -304,7 +304,7 @@ class TopicChoice:
     def _require_images(self) -> None:
         path, topics = self._bag.path, [topic for topic in self._bag.topics if topic.n]
         if not topics:
-            raise DatasetError(f"{path} holds no messages; record it anew")
+            raise DatasetError(f"{path} holds no messages; record it again")
         if any(_has_images(topic) for topic in topics):
             return
         pictures = [topic for topic in topics if "Image" in topic.kind]
@@ -329,8 +329,9 @@ class TopicChoice:
         listed = "".join(f"\n  {one}" for one in self._all)
         example = ",".join(f"{role}={topic}" for role, topic in self._examples(roles).items())
         return DatasetError(
-            f"cannot tell which topics of {self._bag.path} are {what}; these have images, of type, "
-            f"pixels and number:{listed}\nname them with --topics, for example --topics {example}"
+            f"cannot decide which topics of {self._bag.path} are {what}; these have images, of "
+            f"type, pixels and number:{listed}\nname them with --topics, for example --topics "
+            f"{example}"
         )
 
     def _examples(self, roles: tuple[str, ...]) -> dict[str, str]:

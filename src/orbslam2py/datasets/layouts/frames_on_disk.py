@@ -133,7 +133,7 @@ def read_matrices(path: Path, per_line: int) -> FloatArray:
         )
     numbers = np.array(rows, dtype=np.float64)
     if numbers.size == 0 or numbers.size % 16:
-        raise DatasetError(f"{path} holds no whole number of 4 x 4 matrices; copy it anew")
+        raise DatasetError(f"{path} holds no whole number of 4 x 4 matrices; copy it again")
     T = numbers.reshape(-1, 4, 4)
     R = T[:, :3, :3]
     off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
@@ -154,7 +154,8 @@ def known_poses(path: Path, seconds: FloatArray, T_wc: FloatArray) -> Trajectory
     """
     if len(T_wc) < len(seconds):
         raise DatasetError(
-            f"{path} has {len(T_wc)} poses for {len(seconds)} images; copy it anew, or take it away"
+            f"{path} has {len(T_wc)} poses for {len(seconds)} images; copy it again, or take it "
+            "away"
         )
     known = np.isfinite(T_wc[: len(seconds)]).all(axis=(1, 2))
     return Trajectory(seconds[known], T_wc[: len(seconds)][known]) if known.any() else None

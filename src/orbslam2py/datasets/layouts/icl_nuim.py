@@ -31,7 +31,7 @@ class IclNuimSequence(DepthSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence."""
+        """Return whether a folder is such a sequence."""
         return (folder / "rgb").is_dir() and any(folder.glob(_TRUTH))
 
     def _list(self, folder: Path) -> tuple[list[Path], list[Path], Stamps]:

@@ -117,7 +117,7 @@ class KittiRawSequence(RecordedSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a drive."""
+        """Return whether a folder is such a drive."""
         return any(_has_images(folder, left) for left, _ in _PAIRS)
 
     def image_path(self, index: int, /) -> Path:

@@ -64,7 +64,7 @@ class DriveCalibration:
         if bf <= 0:
             raise DatasetError(
                 f"{self._path(CAMERAS_FILE)}: P_rect_{pair[1]:02d} does not stand to the right of "
-                f"P_rect_{pair[0]:02d}; copy the file of the day anew"
+                f"P_rect_{pair[0]:02d}; copy the file of the day again"
             )
         rectification = None
         if raw:
@@ -171,11 +171,11 @@ def _shaped(
     path: Path, values: Mapping[str, FloatArray], key: str, shape: tuple[int, ...]
 ) -> FloatArray:
     if key not in values:
-        raise DatasetError(f"{path} has no line '{key}:'; copy the file of the day anew")
+        raise DatasetError(f"{path} has no line '{key}:'; copy the file of the day again")
     n = int(np.prod(shape))
     if values[key].size != n:
         raise DatasetError(
             f"{path}: {key} has {values[key].size} numbers instead of {n}; copy the file of the "
-            "day anew"
+            "day again"
         )
     return values[key].reshape(shape)

@@ -93,7 +93,7 @@ def _values(path: Path, n_fields: int = _FIELDS) -> list[float]:
             return [number_of(path, line, field) for field in line.fields[:n_fields]]
     raise DatasetError(
         f"{path} does not begin with latitude, longitude, altitude, roll, pitch and yaw"
-        f"{' and all readings' if n_fields > _FIELDS else ''}; copy it anew, or take oxts away"
+        f"{' and all readings' if n_fields > _FIELDS else ''}; copy it again, or take oxts away"
     )
 
 

@@ -41,7 +41,7 @@ class OpenLorisSequence(DepthSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence."""
+        """Return whether a folder is such a sequence."""
         return (folder / _COLOUR).is_file() and (folder / "color").is_dir()
 
     def _list(self, folder: Path) -> tuple[list[Path], list[Path], Stamps]:
@@ -115,7 +115,7 @@ def _values_of(path: Path) -> dict[str, list[float]]:
             raise ValueError("numbers are missing")
     except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         raise DatasetError(
-            f"{path} does not tell the colour camera: it needs {_SENSOR} with width, height and "
-            "four intrinsics; copy it anew, or give --settings"
+            f"{path} does not describe the colour camera: it needs {_SENSOR} with width, height "
+            "and four intrinsics; copy it again, or give --settings"
         ) from error
     return found

@@ -39,7 +39,7 @@ class ReplicaSequence(DepthSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence."""
+        """Return whether a folder is such a sequence."""
         results = folder / "results"
         return results.is_dir() and any(_NAME.fullmatch(p.name) for p in results.glob("frame*"))
 
@@ -77,7 +77,7 @@ class ReplicaSequence(DepthSequence):
             raise DatasetError(cannot_open(path, error)) from error
         except (ValueError, KeyError, TypeError) as error:
             raise DatasetError(
-                f"{path} does not tell the camera: it needs 'camera' with w, h, fx, fy, cx, cy and "
-                "scale; copy it anew"
+                f"{path} does not describe the camera: it needs 'camera' with w, h, fx, fy, cx, "
+                "cy and scale; copy it again"
             ) from error
         return self._camera({**numbers, **size}, scale, path)

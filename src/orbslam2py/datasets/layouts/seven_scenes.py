@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 
 _NAME = re.compile(r"frame-(\d+)\.color\.png")
 _FPS = 30.0
-#: As the page of the data set tells: the cameras were not calibrated.
+#: From the page of the data set: the cameras were not calibrated.
 _CAMERA = {"fx": 585.0, "fy": 585.0, "cx": 320.0, "cy": 240.0}
 _SIZE = {"width": 640, "height": 480, "fps": _FPS}
 _DEPTH_PER_METRE = 1000.0
@@ -44,7 +44,7 @@ class SevenScenesSequence(DepthSequence):
 
     @staticmethod
     def recognises(folder: Path) -> bool:
-        """Tell whether a folder is such a sequence."""
+        """Return whether a folder is such a sequence."""
         return any(_NAME.fullmatch(path.name) for path in folder.glob("frame-*.color.png"))
 
     def _list(self, folder: Path) -> tuple[list[Path], list[Path], Stamps]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the accelerometer says about an IMU, beside the path of the camera."""
+"""Check of the accelerometer against the path of the camera."""
 
 from __future__ import annotations
 
@@ -45,22 +45,22 @@ def check_gravity(
     offset: float,
     settings: ImuSettings | None,
 ) -> None:
-    """Compare the accelerometer with a path, and note or blame what is found.
+    """Compare the accelerometer with a path, and report notes and faults.
 
     Parameters
     ----------
     report
-        Takes what is found.
+        Receives the findings.
     t, accel
         Samples: seconds (n,), and readings in m/s^2 (n, 3).
     path
         Of the camera, without gaps.
     T_ci
-        From the IMU to the camera (4, 4), as the gyro tells it.
+        From the IMU to the camera (4, 4), by the gyro.
     offset
         Seconds to add to the clock of the path for that of the IMU.
     settings
-        What is believed of the IMU.
+        Assumed settings of the IMU.
     """
     if any(fault.kind == "dead" and "accelerometer" in fault.text for fault in report.faults):
         return

@@ -63,7 +63,7 @@ def check_imu(
     paths
         Of the camera, one per map; scales do not matter.
     settings
-        What is believed of the IMU, for the camera that the paths are of; None if nothing is.
+        Assumed settings of the IMU, for the camera of the paths; None if nothing is.
     reach
         Time offsets [s] that are tried, before and after that of the settings.
     """
@@ -114,7 +114,7 @@ def _fitted(
     believed: float,
     reach: float,
 ) -> RateFit | None:
-    """Compare from pose to pose, and for slow motion over longer intervals, if that tells more."""
+    """Compare from pose to pose, or over longer intervals if slow motion makes these more exact."""
     rates = fit_rates(camera, gyro, believed, reach, _STEPS)
     if rates is None or rates.offset_deviation < _SLOW:
         return rates
@@ -191,7 +191,7 @@ def _checked_streams(report: ImuReport, samples: ImuSamples) -> tuple[FloatArray
 
 
 def _check_following(report: ImuReport, rates: RateFit) -> bool:
-    """Whether the gyro follows the camera well enough to tell axes and clock."""
+    """Whether the gyro agrees with the camera well enough to determine axes and clock."""
     if rates.explained >= _EXPLAINED and rates.camera_rms > 0.5 * _TURNING:
         return True
     damaged = any(fault.kind in ("dead", "swapped") for fault in report.faults)
@@ -274,7 +274,7 @@ def _check_axes(
             report.blame(
                 "axes",
                 "the gyro is mirrored: one or all of its axes have the wrong sign; correct the "
-                "sign, or give --imu-settings, which tells which one",
+                "sign, or give --imu-settings, which contains the axes",
             )
             return None
         report.notes.append(f"rotation from IMU to camera: {_matrix_text(rates.R)}")
@@ -338,7 +338,7 @@ def _other_axes(
         report.blame(
             "rotation",
             "the gyro does not turn as the camera with the rotation of the settings; turn about "
-            "all axes, so that the right one can be told",
+            "all axes, so that the right one can be determined",
         )
         return None
     report.blame(

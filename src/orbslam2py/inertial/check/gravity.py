@@ -4,8 +4,8 @@
 The specific force of the IMU, turned into the world, is acceleration minus gravity. Integrated
 twice it is the path: ``D(t) = s p(t) + c0 + c1 t - g t^2 / 2 + B(t) b`` with the scale s of the
 path (one camera: metres per unit), gravity g, the bias b of the accelerometer, and c0, c1 anew for
-each part of the path. All unknowns are linear. Other axes of the accelerometer change D alone, so
-that all 48 exchanges and signs are solved for at once.
+each part of the path. All unknowns are linear. Exchanged axes of the accelerometer only change D,
+so all 48 exchanges and signs are solved together.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _BIAS, _POINT = 0.1, 0.01
 _COMMON, _CERTAIN = 0.5, 15.0
 #: Factor on the misfit of the best axes, up to which others are as good.
 _NEAR_BEST = 1.1
-#: Shorter paths [s] do not tell gravity from motion.
+#: Shorter paths [s] do not separate gravity from motion.
 _SHORTEST = 1.5
 
 
 @dataclass(frozen=True)
 class GravityFit:
-    """What the accelerometer tells with the axes as they are, and which axes fit best.
+    """Result of the accelerometer with the given axes, and the axes that fit best.
 
     Attributes
     ----------
@@ -43,14 +43,14 @@ class GravityFit:
     bias
         Of the accelerometer (3,), m/s^2, in the frame that the rotation belongs to.
     scale, scale_deviation
-        Metres per unit of the path, with the axes as they are.
+        Metres per unit of the path, with the given axes.
     misfit
-        Root mean square of what is left [m].
+        Root mean square residual [m].
     best_axes, best_misfit
         The exchange of axes (3, 3) that fits best: readings in the frame of the IMU are
-        ``best_axes @ reading``; and what is left with it [m].
+        ``best_axes @ reading``; and its residual [m].
     negated_misfit
-        What is left with all readings negated [m].
+        Residual with all readings negated [m].
     seconds
         Length of the path.
     up
@@ -83,7 +83,7 @@ class GravityFit:
 
     @property
     def is_negated(self) -> bool:
-        """Whether they fit clearly worse than with the opposite sign, and no other axes better."""
+        """Whether the opposite sign fits clearly better, and no other axes fit better still."""
         is_best = self.negated_misfit < _NEAR_BEST * self.best_misfit
         return is_best and self._is_worse(self.misfit, self.negated_misfit)
 
@@ -180,7 +180,7 @@ def _design(at: FloatArray, p: FloatArray, biased: FloatArray) -> tuple[FloatArr
 
 def _solve(A: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Solutions, one a column, and the sum of squares that each leaves."""
-    Q, R = np.linalg.qr(A)  # much smaller for what follows
+    Q, R = np.linalg.qr(A)  # reduces the later problem
     x = np.asarray(np.linalg.lstsq(R, Q.T @ y, rcond=None)[0], np.float64)
     return x, np.asarray(((A @ x - y) ** 2).sum(axis=0))
 

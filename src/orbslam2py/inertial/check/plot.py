@@ -26,7 +26,7 @@ def draw_imu_check(
     Parameters
     ----------
     path
-        Where to write; the ending tells the format, and without one it is PNG.
+        Where to write; the suffix gives the format, PNG without one.
     report, samples
         What is shown. What could not be compared with the camera is shown as it was read.
     title

@@ -47,7 +47,7 @@ class CameraRates:
 
 
 def camera_rates(paths: Iterable[Trajectory], span: float = 0.0) -> CameraRates:
-    """Rotation rates of paths; each lies in a world of its own.
+    """Rotation rates of paths; each is in its own world frame.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class RateFit:
         return self.camera.size / self.overlap
 
     def misfit(self, M: FloatArray) -> float:
-        """Mean square of what is left [(rad/s)^2] with another matrix (3, 3) and the best scale."""
+        """Mean square residual [(rad/s)^2] with another matrix (3, 3) and the best scale."""
         c, g = _centred(self.camera), _centred(self.gyro) @ M.T
         scale = max(0.0, float((c * g).sum() / max((g * g).sum(), 1e-12)))
         return float(((c - scale * g) ** 2).mean())
@@ -162,7 +162,7 @@ def fit_rates(
     Parameters
     ----------
     camera, gyro
-        What is compared.
+        The compared rates.
     around, reach
         Middle and half width of the search for the time offset [s].
     least
@@ -311,7 +311,7 @@ def signed_permutations() -> list[FloatArray]:
 
 
 def axes_text(P: FloatArray) -> str:
-    """Say an exchange of axes: ``x = -y, y = x, z = z``."""
+    """Describe an exchange of axes in words: ``x = -y, y = x, z = z``."""
     parts = []
     for name, row in zip("xyz", P, strict=True):
         k = int(np.abs(row).argmax())

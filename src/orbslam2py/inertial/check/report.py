@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the check of an IMU found."""
+"""Result of the check of an IMU."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Finding:
         A short name: ``time_offset``, ``axes``, ``inverse``, ``rotation``, ``degrees``, ``g``,
         ``scale``, ``swapped``, ``dead``, ``saturated``, ``sign`` or ``unrelated``.
     text
-        What is wrong and the likely remedy.
+        The fault and the likely remedy.
     share
         Share of the samples that show it, 0 to 1.
     """
@@ -38,7 +38,7 @@ class ImuReport:
     faults
         All faults; none if the IMU fits.
     notes
-        What was measured, one sentence each.
+        The measurements, one sentence each.
     open_questions
         What could not be checked, and why.
     rates

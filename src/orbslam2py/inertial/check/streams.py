@@ -24,7 +24,7 @@ _STEEP = 3e-3
 def usual_length(t: FloatArray, readings: FloatArray) -> float:
     """Return the median length of means over half a second of readings (n, 3) at seconds (n,).
 
-    Shaking has a mean near zero: what remains of the specific force is gravity.
+    Shaking has a mean near zero: the mean specific force is gravity.
     """
     if len(t) < 2:
         return float(np.median(np.linalg.norm(readings, axis=1)))
@@ -87,7 +87,7 @@ def saturated(axis: FloatArray) -> FloatArray:
 
 
 def accel_unit(length: float) -> str:
-    """Tell the unit of an accelerometer by its `usual_length`: ``m/s^2``, ``g`` or empty."""
+    """Determine the unit of an accelerometer from its `usual_length`: ``m/s^2``, ``g`` or empty."""
     if _NEAR_GRAVITY[0] < length < _NEAR_GRAVITY[1]:
         return "m/s^2"
     return "g" if _NEAR_GRAVITY[0] < length * GRAVITY < _NEAR_GRAVITY[1] else ""

@@ -103,7 +103,7 @@ def crop_among_others(
     cropped = crop_saved_map(saved, stay, points)
     left = map_numbers(cropped.contents.keyframes)
     left_here = numbers[stay] == number
-    # The other maps' edges have been counted anew as well, and are to be as they were.
+    # The edges of the other maps have been counted again as well; their old values are restored.
     counted = _edges_among(cropped.contents.covisibility, cropped.contents.keyframes.ids[left_here])
     before = _edges_among(contents.covisibility, contents.keyframes.ids[numbers != number])
     old, new = contents.keyframes.ids[stay], cropped.contents.keyframes.ids

@@ -14,10 +14,10 @@ from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.units import sees_metres
 from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory, align, associate
 
-#: Fewest positions that tell how a map lies.
+#: Least number of positions that determine the pose of a map.
 _FEWEST = 3
 
-#: Positions lie on a line, as far as can be told, if they spread so much less across it.
+#: Positions count as collinear if their spread across the line is below this part of that along it.
 _THIN = 1e-3
 
 #: Positions that are nearer than this are one.
@@ -111,15 +111,15 @@ def place_by_points(contents: MapContents, positions: FloatArray, known: FloatAr
         )
     if len(positions) < _FEWEST:
         raise MapFileError(
-            f"{len(positions)} known points do not tell how the map lies; give at least {_FEWEST}, "
-            "not on one line"
+            f"{len(positions)} known points do not determine the pose of the map; give at least "
+            f"{_FEWEST}, not on one line"
         )
     placement = _place(contents, positions, known)
     if placement.on_a_line:
         thin = "the map" if _is_thin(_spread(positions)) else "the world"
         raise MapFileError(
-            f"the known points lie on a line in {thin}, so how far the map is turned around it is "
-            "not known; give another one, well beside the line"
+            f"the known points lie on a line in {thin}, so the rotation about the line is not "
+            "determined; give another one, well beside the line"
         )
     return placement
 
@@ -182,7 +182,7 @@ def place_by_length(
     distance = float(np.linalg.norm(ends[1] - ends[0]))
     if distance < _SAME_PLACE:
         raise MapFileError("both ends of the length are at one place; give two that are apart")
-    # Keyframe 0 stays where it is: the origin as a rule, so nothing moves but for the size.
+    # Keyframe 0 stays where it is: usually the origin, so that only the size changes.
     scale = metres / distance
     centre = contents.keyframes.T_wc[0, :3, 3]
     return Placement(Similarity(scale, np.eye(3), (1 - scale) * centre), 2, 0.0, on_a_line=False)

@@ -91,10 +91,10 @@ def align_sightings(
 ) -> tuple[MapContents, AlignmentRecord]:
     """Refine all keyframes and points of a map by sightings that are aligned in the images.
 
-    ORB finds the corner of a point in every image anew, half a pixel to and fro. Here one sighting
-    of each point is the reference, and the others are moved to where their image looks like it.
-    Then everything is adjusted, as `optimize_map` does. The map keeps its keypoints as they were
-    found: aligned positions serve the adjustment alone.
+    ORB detects the corner of a point in every image separately, with errors of half a pixel. Here
+    one sighting of each point is the reference, and the others are moved to where their image looks
+    like it. Then everything is adjusted, as `optimize_map` does. The map keeps its keypoints as
+    they were found: aligned positions serve the adjustment alone.
 
     Parameters
     ----------
@@ -112,16 +112,16 @@ def align_sightings(
     contents
         The refined map. Keyframe 0 stays where it is.
     record
-        What was aligned, and errors before and after.
+        Numbers of aligned sightings, and errors before and after.
 
     Raises
     ------
     DatasetError
-        If no keyframe's time stamp is in the sequence, or its images show something else.
+        If no keyframe's time stamp is in the sequence, or its images do not show the map.
     ImageError
         If an image has not the size of its camera.
     MapFileError
-        If the contents are impossible, or an argument is something else.
+        If the contents are inconsistent, or an argument has the wrong type.
     """
     began = time.perf_counter()
     contents_of(contents)
@@ -156,7 +156,7 @@ def align_sightings(
 
 
 class _Images:
-    """Images of keyframes, read anew at each pass, since all of them may not fit into memory."""
+    """Images of keyframes, read again at each pass, because all may not fit into memory."""
 
     def __init__(
         self,
@@ -212,12 +212,12 @@ def _grey(image: ByteArray, rgb: bool, keyframe: int) -> ByteArray:
 
 
 def _check_share(counts: list[int]) -> None:
-    """Refuse images that do not look like the points: nothing of them would be true."""
+    """Refuse images that do not look like the points: they would be wrong."""
     n = sum(counts)
     if n and counts[0] < _LEAST_ALIGNED * n:
         raise DatasetError(
-            f"only {counts[0]} of {n} sightings look alike in these images, so they show something "
-            "else than the map; give the sequence that the map was made of"
+            f"only {counts[0]} of {n} sightings look alike in these images, so they do not "
+            "show the map; give the sequence that the map was made of"
         )
 
 

@@ -94,7 +94,7 @@ def spanning_parents(
     for child in np.setdiff1d(np.flatnonzero(parents == _NONE), roots).tolist():
         mine = maps == maps[child]
         near = [n for n in neighbours[child] if mine[n] and not _is_above(parents, child, n)]
-        # The root has no parent, so it is in nobody's subtree: the search always ends.
+        # The root has no parent, so it is in no other subtree: the search always ends.
         rows = np.flatnonzero(mine[:child])[::-1].tolist()
         before = (n for n in rows if not _is_above(parents, child, n))
         parents[child] = near[0] if near else next(before)

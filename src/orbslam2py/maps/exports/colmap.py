@@ -69,9 +69,9 @@ def export_colmap(
         ``progress(done, total)`` after every image.
     field
         Fisheye cameras: write `images` as a pinhole sees them, with this angle of view in the
-        longer direction [degrees]. By default models that COLMAP has stay as they are, and images
-        of other models show the widest view without empty borders, at most 120 degrees. Keypoints
-        beside that view are at (0, 0) and belong to no point.
+        longer direction [degrees]. By default, images of models that COLMAP has are not changed.
+        Images of other models show the widest view without empty borders, at most 120 degrees.
+        Keypoints beside that view are at (0, 0) and belong to no point.
 
     Raises
     ------

@@ -84,9 +84,9 @@ def write_images(
     """Write the keyframes' images as PNG files of a pinhole camera.
 
     Those of fisheye cameras that the format can hold stay as they are; of others a pinhole view is
-    cut out. Of pinhole cameras the camera keeps its matrix; what a lens bends out of the image is
-    cut off, and where it bends in nothing, the image is black. Images of another size than the
-    camera's (small copies) are taken for scaled ones.
+    cut out. Of pinhole cameras the camera keeps its matrix; parts beyond the image are cut off, and
+    parts without pixels are black. Images of another size than the camera's (small copies) are
+    taken for scaled ones.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def refuse_rig(contents: MapContents, what: str) -> None:
 
 
 class _PinholesOfFisheyes:
-    """Pinhole views of the fisheye cameras that a format cannot hold, made once and told once."""
+    """Pinhole views for fisheye cameras that a format cannot hold, made and reported once."""
 
     def __init__(self, contents: MapContents, held: Collection[str], field: float | None) -> None:
         self._contents, self._held = contents, held

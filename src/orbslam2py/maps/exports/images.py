@@ -172,7 +172,7 @@ class View:
     undistorted: bool
     """The image shows what a pinhole camera sees; otherwise the lens distorts it."""
     pinhole: PinholeView | None = None
-    """The pinhole, if it is another one than the camera's own without its distortion."""
+    """The pinhole, if it differs from the camera without its distortion."""
 
 
 def fisheye_of(

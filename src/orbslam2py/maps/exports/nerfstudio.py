@@ -73,8 +73,8 @@ def export_nerfstudio(
         ``progress(done, total)`` after every image.
     field
         Fisheye cameras: write `images` as a pinhole sees them, with this angle of view in the
-        longer direction [degrees]. By default Kannala-Brandt lenses (``OPENCV_FISHEYE``) stay as
-        they are, and images of other models show the widest view without empty borders, at most
+        longer direction [degrees]. By default, images of Kannala-Brandt lenses (``OPENCV_FISHEYE``)
+        are not changed. Images of other models show the widest view without empty borders, at most
         120 degrees.
 
     Raises
@@ -119,7 +119,7 @@ def _transforms(contents: MapContents, views: list[View], below: str) -> dict[st
     poses = camera_to_world(contents.keyframes.T_wc, T_up)
     frames: list[dict[str, Any]] = []
     cameras = [_camera(contents, view) for view in views]
-    # What all images share stands once, as in files of a single camera.
+    # Values that all images share are written once, as in files of a single camera.
     shared = cameras[0] if all(camera == cameras[0] for camera in cameras) else {}
     for view, camera in zip(views, cameras, strict=True):
         frame = {

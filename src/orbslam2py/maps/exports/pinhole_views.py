@@ -24,7 +24,7 @@ _BORDER_POINTS = 50
 
 @dataclass(frozen=True, eq=False)
 class PinholeView:
-    """What a pinhole without distortion shows of the image of another camera.
+    """Pinhole views, without distortion, of the images of another camera.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def pinhole_view(camera: CameraModel, field: float | None) -> PinholeView:
 
 
 def checked_field(field: float) -> float:
-    """Check an angle of view [degrees] that somebody gave.
+    """Check a given angle of view [degrees].
 
     Raises
     ------

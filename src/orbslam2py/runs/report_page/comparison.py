@@ -17,7 +17,7 @@ from orbslam2py.runs.report_page.story import Story
 
 #: Groups of figures that are compared.
 GROUPS = ("Accuracy", "Tracking", "Map", "Speed")
-#: Figures that say what was compared, not how it went.
+#: Figures that describe the compared runs, not their results.
 _LEFT_OUT = frozenset(["frames", "seen_frames", "lost_at_end", "matched_of_poses"])
 
 

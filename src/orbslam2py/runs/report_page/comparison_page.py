@@ -23,7 +23,7 @@ from orbslam2py.runs.timeline import gaps_in_time
 _N_COLOURS = 6
 #: Most corners of a path in three dimensions.
 _CORNERS = 2500
-#: Most frames of a run that the cursor tells of.
+#: Most frames of a run for which the cursor shows values.
 _FRAMES = 5000
 
 

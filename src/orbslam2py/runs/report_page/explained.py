@@ -175,8 +175,8 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
     ),
     "Run": (
         Figure("sequence", "sequence", "", "name of the folder, file or camera"),
-        Figure("layout", "layout", "", "how the sequence lies on disk"),
-        Figure("sensor", "sensor", "", "what the images come from"),
+        Figure("layout", "layout", "", "layout of the sequence on disk"),
+        Figure("sensor", "sensor", "", "sensor of the images"),
         Figure("deterministic", "deterministic", "", "whether mapping ran inline"),
         Figure("realtime", "real time", "", "whether time stamps were followed"),
         Figure("seed", "seed", "", "of all random draws"),
@@ -198,7 +198,7 @@ TERMS = {
     "loops closed": "how often the camera came back to a place and the drift was taken out",
 }
 
-#: What the stages of tracking are.
+#: Descriptions of the stages of tracking.
 STAGES = {
     "extract": "extracting features",
     "stereo": "stereo matching, or depth of keypoints",
@@ -207,7 +207,7 @@ STAGES = {
     "keyframe": "deciding about and making a keyframe; beginning a map, or doubting a young one",
 }
 
-#: What the stages beside tracking are.
+#: Descriptions of the stages beside tracking.
 STAGES_BESIDE = {
     "mapping": "all of local mapping, for one keyframe",
     "mapping.insert": "taking the keyframe into the map's graph",
@@ -221,12 +221,12 @@ STAGES_BESIDE = {
     "loop.verify": "whether the geometry agrees that it is this place",
     "loop.wait": "waiting until mapping pauses",
     "loop.plan": "where the keyframes and points around the loop belong",
-    "loop.weld": "refining what is around the place at which two maps became one",
+    "loop.weld": "refining the map around the place where two maps were merged",
     "loop.graph": "spreading the correction over all keyframes",
     "loop.apply": "moving the map",
     "adjustment.gather": "collecting the whole map",
     "adjustment.solve": "refining all keyframes and points together",
     "adjustment.wait": "waiting until mapping pauses",
     "adjustment.commit": "moving the map",
-    "adjustment.local": "refining what was made meanwhile",
+    "adjustment.local": "refining keyframes and points that were added in between",
 }

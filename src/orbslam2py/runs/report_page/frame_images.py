@@ -29,7 +29,7 @@ _N_KEYFRAMES = 8
 _N_LOST = 4
 _QUALITY = 72
 
-#: Fill and rim of a point [BGR]: seen on light and dark ground, whatever colours one can see.
+#: Fill and rim of a point [BGR]: visible on light and dark ground, also for colour-blind people.
 _FILL, _RIM = (66, 228, 240), (60, 40, 0)
 
 
@@ -100,7 +100,7 @@ def write_frame_images(path: Path, result: RunResult, positions: list[int]) -> N
             if small is not None:
                 points = _points_seen(result, position)
                 jpeg = draw_frame(small, points, result.settings)
-                # A date of its own would make the bytes of two equal runs differ.
+                # A date would make the bytes of two equal runs differ.
                 archive.writestr(zipfile.ZipInfo(f"{row.index:06d}.jpg"), jpeg)
 
 

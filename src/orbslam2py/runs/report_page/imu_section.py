@@ -28,7 +28,7 @@ _MEANING = {
 
 
 def imu_section(story: Story) -> Markup | None:
-    """Verdict, what was measured, and plots; None for a run without an IMU."""
+    """Verdict, measurements, and plots; None for a run without an IMU."""
     entry = story.run.report.get("imu")
     if not entry:
         return None

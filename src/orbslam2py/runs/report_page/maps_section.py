@@ -19,9 +19,10 @@ from orbslam2py.runs.timeline import gaps_in_time
 from orbslam2py.trajectory import Trajectory
 
 _NOTE = (
-    "Each map has a frame and, with one camera, a unit of its own: where one lies beside another "
-    "means nothing. The main map is that with most tracked frames; it is the one of the pictures "
-    "and figures above. Paths of the others are in trajectory_mapK.txt, all are drawn in maps.png."
+    "Each map has a frame and, with one camera, a unit of its own. The relative position of two "
+    "maps has no meaning. The main map is that with most tracked frames; it is the one of the "
+    "pictures and figures above. Paths of the others are in trajectory_mapK.txt, all are drawn in "
+    "maps.png."
 )
 
 

@@ -23,9 +23,9 @@ from orbslam2py.runs.report_page.scene import script_data
 from orbslam2py.runs.report_page.story import Story
 
 _FOLDER = Path(__file__).parents[2] / "data" / "report_page"
-#: What the head of a page begins to say about its maker; the version follows.
+#: Beginning of the page's head about the program; the version follows.
 _MADE_BY = '<meta name="generator" content="orbslam2py '
-#: What it says about what the page is of; those of earlier versions are recognised by their titles.
+#: Part of the head about the contents; those of earlier versions are recognised by their titles.
 _IS_OF = '<meta name="orbslam2py-page" content="'
 #: Bytes in which these come.
 _HEAD = 4096
@@ -240,8 +240,8 @@ def _notes(report: dict[str, Any]) -> Markup | None:
     own_unit = report.get("sensor") == "mono" and not metric
     if own_unit and report.get("tracked") and not report.get("ate_scale"):
         said.append(
-            "Lengths are in the map's own units: a single camera cannot see metres, and no ground "
-            "truth tells them."
+            "Lengths are in the map's own units: a single camera cannot measure metres, and "
+            "there is no ground truth."
         )
     if not said:
         return None

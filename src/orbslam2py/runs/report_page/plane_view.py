@@ -9,7 +9,7 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 
-#: By so much a camera must have gone up or down more than forward to be looked at from behind.
+#: Ratio of vertical to forward motion above which the path is drawn from behind.
 _MORE = 2.0
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 
-#: What stands for a value that there is not.
+#: Text for a missing value.
 NONE = "\N{EN DASH}"
 
 #: Most buckets that a line is reduced to; each keeps its smallest and its largest value.

@@ -29,7 +29,7 @@ from orbslam2py.slam.records import TrackingState
 from orbslam2py.trajectory import Trajectory, read_tum
 from orbslam2py.trajectory.level import level_frame, moved
 
-#: What a frame of a run may be, as `FrameRow.state` tells it.
+#: States of a frame, the values of `FrameRow.state`.
 _STATES = frozenset([*TrackingState.__members__, "SKIPPED", "DROPPED"])
 
 
@@ -214,7 +214,7 @@ def _check_number(file: Path, found: int, noun: str, told: Any) -> None:
     """Check that a file is as long as the report says; older reports may not say it."""
     if isinstance(told, int) and told != found:
         raise DatasetError(
-            f"{file} holds {number_of(found, noun)}, but report.json tells of {told}: it is cut, "
+            f"{file} holds {number_of(found, noun)}, but report.json has {told}: it is cut, "
             "or of another run; run the sequence again"
         )
 
@@ -222,7 +222,7 @@ def _check_number(file: Path, found: int, noun: str, told: Any) -> None:
 def _poses_of_main_map(report: dict[str, Any]) -> int | None:
     for entry in report.get("maps", []):
         if entry["map"] == report.get("main_map"):
-            tracked: int | None = entry.get("tracked")  # an older report does not tell
+            tracked: int | None = entry.get("tracked")  # older reports lack it
             return tracked
     return None
 
@@ -279,7 +279,7 @@ def read_frames(path: Path) -> Frames:
         The message names the file, and the line if one is invalid.
     """
     try:
-        # Reasons hold names of files byte by byte; a page holds only what is UTF-8.
+        # Reasons hold names of files byte by byte; a page can only hold UTF-8.
         with path.open(newline="", encoding="utf-8", errors="replace") as stream:
             reader = csv.reader(stream)
             header = next(reader, [])

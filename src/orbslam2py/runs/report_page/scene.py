@@ -84,7 +84,7 @@ def loop_ends(run: RunFolder) -> FloatArray:
     """Return both ends of the loops of the main map, (l, 2, 3), in the unit of the page."""
     numbers = run.frames.map_index[np.isfinite(run.frames.map_index)]
     last_map = int(numbers[-1]) if len(numbers) else 0
-    # Folders of earlier versions hold only what came last.
+    # Folders of earlier versions only hold the last state.
     main = run.report.get("main_map", last_map)
     of_map = [loop for loop in run.report.get("loops", []) if loop.get("map") == main]
     if not of_map or not len(run.path):

@@ -162,7 +162,7 @@ def _found(run: RunFolder, events: list[Event]) -> str:
 
 
 def _what_happened(run: RunFolder, events: list[Event], position: int, place: int) -> str:
-    """Return a text: what was unusual around a frame."""
+    """Return a text: unusual events around a frame."""
     frames = run.frames
     near = np.abs(frames.timestamps - frames.timestamps[position]) <= _AROUND
     said = [event.text for event in events if near[event.position]]

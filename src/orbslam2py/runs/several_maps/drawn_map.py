@@ -109,7 +109,7 @@ def _drawn(number: int, state: str, paths: Sequence[Trajectory], snapshot: MapSn
 def _gaps(path: Trajectory, *, first: bool) -> npt.NDArray[np.bool_]:
     gaps = gaps_in_time(path.timestamps)
     gaps[1:] |= _missing(path.indices)
-    gaps[:1] = not first  # nothing leads from one run to the next
+    gaps[:1] = not first  # runs are not connected
     return gaps
 
 

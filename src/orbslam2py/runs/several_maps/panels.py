@@ -56,7 +56,7 @@ def draw_maps(
     height = n_rows * _PANEL[1] + _HEAD
     figure = Figure(figsize=(n_columns * _PANEL[0], height), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
-    said = "Each map has a world of its own: where one lies beside another means nothing."
+    said = "Each map has its own world frame: the relative position of two maps has no meaning."
     if len(shown) < len(maps):
         said += f" The {len(shown)} longest of {len(maps)} maps."
     figure.suptitle(f"{title}\n{said}", fontsize=10, parse_math=False)  # names may have dollars

@@ -49,7 +49,7 @@ class MultiHypothesisSearch:
     search : PoseSearch
         Estimates poses.
     judge : PoseValidator
-        Weighs what they find.
+        Judges the hypotheses.
     """
 
     def __init__(self, search: PoseSearch, judge: PoseValidator) -> None:
@@ -73,8 +73,8 @@ class MultiHypothesisSearch:
         Returns
         -------
         Hypothesis or None
-            The hypothesis with the strongest evidence: `first`, unless another one is clearly
-            better; None if nothing was found.
+            The hypothesis with the strongest evidence: `first`, unless another hypothesis is
+            clearly better; None if nothing was found.
         State
             The state after relocalization.
         """
@@ -146,7 +146,7 @@ class MultiHypothesisSearch:
     def _best(self, found: list[Hypothesis]) -> Hypothesis:
         best = found[0]
         for hypothesis in found[1:]:
-            # What was found first stays unless another one is clearly better.
+            # The first hypothesis stays unless another one is clearly better.
             if hypothesis.n_inliers > _BETTER * best.n_inliers:
                 best = hypothesis
         if any(self._confirms(best, other) for other in found if other is not best):

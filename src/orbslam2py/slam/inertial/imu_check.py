@@ -37,16 +37,16 @@ _WINDOW = 10.0
 _AGREEING = 2
 #: Time offsets [s] that are tried, before and after that of the settings.
 _REACH = 0.25
-#: Rates [rad/s], root mean square, from which on an axis without any change is dead.
+#: Rates [rad/s], root mean square, above which an axis that never changes counts as dead.
 _MOVING = 0.08
 #: Largest standard deviation of the time offset [s] with which the IMU counts as tested: slow
-#: motion does not show it, and an error that does not show does no harm in it. The tests go on
+#: motion does not show it, and an error that does not show does no harm in it. The tests continue
 #: until it is known to the second value, because faster motion may follow.
 _USABLE_OFFSET, _KNOWN_OFFSET = 0.04, 0.015
 #: Share of the samples at the end of the range, above which the range is too small.
 _SATURATED = 0.01
 
-#: Changes of a map that are told apart.
+#: Kinds of changes of a map.
 _WORLDS = 1_000_000
 
 #: Runs a test, now or in another thread.
@@ -57,7 +57,7 @@ class ImuVerdict(str, enum.Enum):
     """Whether the IMU may be used."""
 
     UNKNOWN = "unknown"
-    """There was too little motion to tell, or there are no samples."""
+    """There was too little motion for a decision, or there are no samples."""
     FITS = "fits"
     """Gyro and accelerometer agree with the path of the camera."""
     HELD_BACK = "held back"
@@ -69,7 +69,7 @@ class ImuVerdict(str, enum.Enum):
 
 @dataclass(frozen=True)
 class _Window:
-    """What one test compares."""
+    """Input of one test."""
 
     samples: FloatArray
     poses: FloatArray
@@ -79,8 +79,8 @@ class ImuCheck:
     """The verdict on an IMU, from the samples and poses of the frames so far.
 
     It is asked from any thread. A fault must show in two tests in a row, which are half a second
-    apart; so must a fit. After a fault the tests go on with what comes afterwards. An IMU that fits
-    is tested for 20 s, because slow motion does not show all faults.
+    apart; so must a fit. After a fault the tests continue with later samples. An IMU that fits is
+    tested for 20 s, because slow motion does not show all faults.
 
     Parameters
     ----------
@@ -125,11 +125,11 @@ class ImuCheck:
 
     @property
     def report(self) -> ImuReport | None:
-        """What the last test measured, such as the time offset; None before the first one."""
+        """Measurements of the last test, such as the time offset; None before the first one."""
         return self._report
 
     def add(self, interval: ImuInterval | None, record: TrackingRecord, n_changes: int = 0) -> None:
-        """Add what is known of a frame.
+        """Add a frame and its pose.
 
         Parameters
         ----------
@@ -138,8 +138,8 @@ class ImuCheck:
         record
             Its pose; one that the IMU alone predicted counts as none.
         n_changes
-            Number of times that the map as a whole was moved: poses before and after are not
-            compared with each other.
+            Number of motions of the whole map: poses before and after are not compared with each
+            other.
         """
         if self._done:
             return
@@ -170,7 +170,7 @@ class ImuCheck:
                 self._samples, self._poses = [], []
 
     def restart(self) -> None:
-        """Begin anew after a reset; a verdict stays."""
+        """Restart after a reset; a verdict stays."""
         self._forget()
 
     def _forget(self) -> None:
@@ -191,7 +191,7 @@ class ImuCheck:
         self._run(lambda: self._judge(window))
 
     def _trim(self) -> None:
-        """Leave out what is older than the window."""
+        """Drop poses and samples that are older than the window."""
         begin = self._poses[-1][0] - _WINDOW
         self._poses = [row for row in self._poses if row[0] >= begin]
         begin += self._settings.time_offset

@@ -74,14 +74,14 @@ class InertialInput:
         record
             The image's pose.
         n_changes
-            Number of times that the map as a whole was moved.
+            Number of motions of the whole map.
         """
         self.interval = interval
         if self.check is not None:
             self.check.add(interval, record, n_changes)
 
     def restart(self) -> None:
-        """Begin anew: the next image has no image before it."""
+        """Restart: the next image has no image before it."""
         self.buffer.restart()
         if self.check is not None:
             self.check.restart()

@@ -31,7 +31,7 @@ FIRST_BIAS = (0.1, 0.2)
 
 @dataclass(frozen=True, eq=False)
 class KnownBefore:
-    """What is known of an IMU and of a map before the IMU starts in it."""
+    """Prior knowledge about an IMU and a map before the IMU starts."""
 
     bias: FloatArray
     """(6,) gyro [rad/s], accelerometer [m/s^2]."""
@@ -100,7 +100,7 @@ class InertialStarter:
         slam_map : orbslam2py._core.Map
             The map.
         known : KnownBefore
-            What is known already.
+            The prior knowledge.
         """
         turn, place = np.median([view.deviations for view in views.views], axis=0)
         start = core.estimate_inertial_start(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the IMU does in tracking: start, prediction, and poses where images give none.
+"""Use of the IMU in tracking: start, prediction, and poses where images give none.
 
 ``docs/method/inertial.md#tracking``.
 """
@@ -44,7 +44,7 @@ _LOADED = (0.01, 0.01)
 _OF_MAP = 1e-3
 #: Squared Mahalanobis distance (6 degrees of freedom) that one pose in a million exceeds.
 _FAR = 38.0
-#: Images in a row that contradict the IMU, after which it starts anew.
+#: Successive images that contradict the IMU, after which it starts again.
 _CONTRADICTIONS = 5
 #: Corrections of gravity [rad] and scale that are worth moving the map for.
 _WORTH = 2e-3
@@ -64,7 +64,7 @@ class InertialTracker:
     metric : bool
         The unit of the map is the metre: with depth.
     idle : callable
-        Whether nobody else works on the map.
+        Whether no other worker uses the map.
     config : InertialConfig
         Thresholds.
     """
@@ -99,7 +99,8 @@ class InertialTracker:
         self.map_moves: list[MapMove] = []
         #: Seconds of the last image whose pose is its own.
         self.last_seen = -math.inf
-        # Of the first image of those in a row that show enough, and that the IMU leads through.
+        # Time of the first of the successive images with enough features whose poses the IMU
+        # predicts.
         self._shown_since = math.inf
         self._T_lw: core.Pose | None = None
         self._big_change = 0
@@ -114,7 +115,7 @@ class InertialTracker:
         self._bias_deviations = FIRST_BIAS
         # Seconds of the image at which the map was last turned.
         self._aligned_at = -math.inf
-        # The state after the longest time without an image: it tells where another map begins.
+        # The state after the longest time without an image: another map begins at its pose.
         self._adrift: core.InertialFilter | None = None
         # Deviations of gravity [rad] and of the scale's logarithm in the maps that were turned.
         self._known: dict[int, tuple[float, float]] = {}
@@ -203,16 +204,16 @@ class InertialTracker:
     def judge(
         self, frame: core.TrackedFrame, estimate: PoseEstimate, motion: Motion
     ) -> PoseEstimate:
-        """Refuse a pose that the IMU contradicts, and give the predicted one where there is none.
+        """Reject a pose that the IMU contradicts; return the predicted pose if there is none.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            The frame; its pose is set where the IMU leads.
+            The frame; its pose is set if the IMU predicts it.
         estimate : PoseEstimate
-            What the image gave.
+            Estimate from the image.
         motion : Motion
-            The last frame with a pose of its own.
+            The last frame with a pose by its image.
         """
         if estimate.found and self._contradicts(frame, estimate):
             if _is_strong(estimate):
@@ -265,8 +266,8 @@ class InertialTracker:
         self._take_over(frame)
         if self._n_contradictions >= _CONTRADICTIONS:
             _log.warning(
-                "the IMU contradicts %d images in a row; it starts anew (orbslam2py check-imu "
-                "tells whether it fits the camera)",
+                "the IMU contradicts %d images in a row; it starts again (orbslam2py check-imu "
+                "checks whether it fits the camera)",
                 self._n_contradictions,
             )
             self.forget()
@@ -292,18 +293,18 @@ class InertialTracker:
         return self._adrift is not None
 
     def end_of_map(self) -> None:
-        """Stop leading; the state tells where another map begins."""
+        """Stop leading; the state is the pose at which another map begins."""
         adrift = self.filter
         self.forget()
         self._adrift = adrift
 
     def is_beyond_map(self, frame: core.TrackedFrame, shows_enough: bool) -> bool:
-        """Return whether what a frame shows is no part of the map, although it shows enough.
+        """Return whether a frame with enough features shows a place that is not in the map.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
-            One that the IMU leads through.
+            A frame whose pose the IMU predicts.
         shows_enough : bool
             Its features would do for the begin of a map.
         """
@@ -311,7 +312,7 @@ class InertialTracker:
         return frame.timestamp - self._shown_since >= self._limits.beyond
 
     def map_continued(self, frame: core.TrackedFrame) -> None:
-        """Go on from a frame at the predicted pose that became a keyframe.
+        """Continue from a keyframe at the predicted pose.
 
         Parameters
         ----------
@@ -355,7 +356,7 @@ class InertialTracker:
 
     @property
     def _leads(self) -> bool:
-        """The image before had no pose of its own."""
+        """The image before gave no pose."""
         samples = self._samples
         return samples is not None and bool(self.last_seen < samples[0, 0] - 1e-6)
 
@@ -388,14 +389,14 @@ class InertialTracker:
         return max(1.0, self._limits.common / seconds) * (covariance + np.diag(of_map))
 
     def reset(self) -> None:
-        """Forget all maps; what is known of the biases stays."""
+        """Forget all maps; the estimates of the biases stay."""
         self.forget()
         self._adrift = None
         self._known.clear()
         self.keyframes.clear()
 
     def forget(self) -> None:
-        """Drop the state; the biases are kept as what is known before the next start."""
+        """Drop the state; the biases are kept as priors of the next start."""
         if self.filter is not None:
             self._bias = self.filter.bias
             deviations = np.sqrt(np.diag(self.filter.covariance)[9:18])
@@ -442,7 +443,7 @@ class InertialTracker:
         return state
 
     def _take_over(self, last: core.TrackedFrame) -> None:
-        """Note the last frame with a pose of its own, as it is in the map."""
+        """Store the last frame with a pose by its image, at its place in the map."""
         self.last_seen = last.timestamp
         self._shown_since = math.inf
         self._T_lw = last.T_cw
@@ -456,7 +457,7 @@ class InertialTracker:
         return state.following(self._map)
 
     def _realign(self, state: State) -> State:
-        """Turn and scale the map anew where gravity and scale turn out to be others."""
+        """Turn and scale the map again if the estimates of gravity and scale have changed."""
         assert self.filter is not None
         now = state.motion.last.timestamp
         if now - self._aligned_at < _ALIGN_EVERY:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses of tracked images with the samples of the IMU between them."""
+"""Views for the start of an IMU: poses of images, and the IMU samples between them."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ class InertialView:
     T_ck: core.Pose
     """From the keyframe to the camera."""
     deviations: tuple[float, float]
-    """Standard deviations of rotation [rad] and position, by the pose's covariance."""
+    """Standard deviations of rotation [rad] and position, from the covariance of the pose."""
     samples: FloatArray = field(repr=False)
-    """(n, 7), since the view before."""
+    """(n, 7), IMU samples since the view before."""
 
     def T_wc(self, slam_map: core.Map) -> core.Pose:
-        """Return its pose in the map as it is now."""
+        """Return the pose in the present map."""
         return (self.T_ck @ slam_map.keyframe_pose(self.keyframe)).inverse()
 
 
 class InertialViews:
-    """Collects views; the spacing grows with the time, so that there are never more than 30."""
+    """Collects at most 30 views for the start of the IMU; their spacing grows with time."""
 
     def __init__(self) -> None:
         self.views: list[InertialView] = []
@@ -43,7 +43,7 @@ class InertialViews:
         self._samples: list[FloatArray] = []
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Remove all views."""
         self.views.clear()
         self._samples.clear()
         self._spacing = _SPACING
@@ -60,18 +60,18 @@ class InertialViews:
         covariance: FloatArray | None,
         samples: FloatArray | None,
     ) -> bool:
-        """Take a tracked frame; whether it became a view.
+        """Add a frame; return whether it became a view.
 
         Parameters
         ----------
         slam_map : orbslam2py._core.Map
-            Where its pose is.
+            The map of the frame's pose.
         frame : orbslam2py._core.TrackedFrame
-            With its pose.
+            A tracked frame, with its pose.
         covariance : array of float64, (6, 6), or None
-            Of its pose.
+            Covariance of its pose.
         samples : array of float64, (n, 7), or None
-            Since the frame before; None: there are none, and the views before are forgotten.
+            IMU samples since the frame before; None removes all views, because samples are missing.
         """
         if samples is None:
             self.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moves of a whole map by an IMU, and what they do to poses from before."""
+"""Motions of a whole map by an IMU, and their effect on earlier poses."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _PATIENCE, _PATIENCE_SECONDS = 10, 1.0  # frames, or time [s], until there are s
 _REMEMBERED_FRAMES = 200  # that are tracked in a new map after it began: ten seconds at 20 a second
 _FOLLOWED_AGAIN = 20  # of them, that begin the next map after one was dropped
 
-#: What the two views' reconstruction says, in the words of a record.
+#: Outcomes of the reconstruction from two views, as reasons of a record.
 _REASONS = {
     "too_few_matches": Reason.FEW_MATCHES_FIRST_VIEW,
     "degenerate_points": Reason.DEGENERATE_VIEWS,

@@ -85,7 +85,7 @@ class View:
             then = _inverse(other._linked[self.frame.id], len(every))[every]
         else:
             return partners
-        # One to one: what the last frame says holds.
+        # One to one: the last frame decides.
         taken = np.isin(then, partners[partners >= 0])
         return np.where(partners >= 0, partners, np.where(taken, -1, then))
 
@@ -170,7 +170,7 @@ class InitialViews:
             centre = np.array([pinhole.cx, pinhole.cy])
             self._motion = ImageMotion(centre, centre)
         limits = self._limits
-        # As before, it is enough to look near to where that leads; else ever wider.
+        # As before, a search near the prediction is enough; else ever wider.
         enough, windows = self._n_usual // 2, [(self._motion, limits.window)]
         if self._motion.spread is not None:
             windows.insert(0, (self._motion, _NARROW * limits.window + 4 * self._motion.spread))

@@ -31,7 +31,7 @@ from orbslam2py.slam.initialization.third_view import (
 )
 
 _FURTHER_DRAWS = 5  # RANSAC runs whose motions are compared in all views together
-_ROUNDS = 2  # of adjustment, each followed by placing all matches anew
+_ROUNDS = 2  # of adjustment, each followed by a new triangulation of all matches
 _COLLAPSED = 1e-9  # of the way before the adjustment
 
 
@@ -55,7 +55,7 @@ class _Sightings:
 
     @staticmethod
     def of(frame: core.Frame, rows: np.ndarray, keypoints: np.ndarray) -> _Sightings:
-        """What a frame sees: one row for each keypoint."""
+        """Observations of a frame: one row for each keypoint."""
         return _Sightings(
             rows,
             frame.keypoints[keypoints].astype(np.float64),
@@ -248,7 +248,7 @@ class MultiViewModelSelection:
         )
         length = np.linalg.norm(adjusted[1].translation)
         if not length > _COLLAPSED:  # nor not a number
-            # Views without parallax may end in one place: then the motion stays what it was.
+            # Views without parallax may end in one place: then the motion does not change.
             return unchanged
         T_21, *others = (core.Pose(T.quaternion_xyzw, T.translation / length) for T in adjusted[1:])
         left = iter(others)

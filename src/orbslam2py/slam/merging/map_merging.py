@@ -123,7 +123,7 @@ class MapMerging:
         same_map = [loop for loop in others if self._map.map_of(loop.matched) == here]
         if not all(self._is_drift(loop) for loop in same_map):
             return False
-        # What the far end looks like in its own map.
+        # Keyframes of its own map that look like the far end.
         there = self._map.map_of(best.matched)
         alike = [k for k in self._find_alike(best.matched) if self._map.map_of(k) == there]
         found = (self._verify(best.matched, k) for k in alike[:_PLACES])
@@ -208,7 +208,7 @@ class MapMerging:
     def join(
         self, loop: core.Loop, timer: StageTimer, cancelled: core.StopFlag
     ) -> MapsMerged | None:
-        """Merge two maps; local mapping is paused meanwhile.
+        """Merge two maps; local mapping is paused.
 
         Parameters
         ----------

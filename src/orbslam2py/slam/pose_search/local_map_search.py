@@ -48,7 +48,7 @@ class RefinedPose:
 
     @cached_property
     def evidence(self) -> tuple[int, int, float, FloatArray]:
-        """Return what the matches say of the pose; see `orbslam2py._core.pose_evidence`."""
+        """Return the evidence of the matches for the pose; see `orbslam2py._core.pose_evidence`."""
         return core.pose_evidence(self.frame)
 
 
@@ -190,7 +190,8 @@ class LocalMapSearch:
         if n_inliers < limits.local_map_inliers:
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
         if n_of_map < limits.map_matches:
-            # What the frame before measured speaks for itself, and says nothing of the map.
+            # Temporary points come from the frame before, and are no evidence for a place in the
+            # map.
             return replace(estimate, visual_odometry=True)
         return estimate
 

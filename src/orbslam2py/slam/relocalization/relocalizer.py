@@ -82,7 +82,7 @@ class Relocalizer:
         frame : orbslam2py._core.TrackedFrame
             The frame. If it is not found, it has no associations.
         lost : LostSearch
-            What is known of earlier frames.
+            State of the search in earlier frames.
 
         Returns
         -------
@@ -222,7 +222,7 @@ class Relocalizer:
             return []
         guess = T_cw.inverse().matrix
         distances = np.linalg.norm(T_wc[:, :3, 3] - guess[:3, 3], axis=1)
-        # The optical axes; whoever looks the other way sees other points.
+        # The optical axes; a camera in the opposite direction sees other points.
         cosines = T_wc[:, :3, 2] @ guess[:3, 2]
         distances[cosines < _GUESS_COSINE] = np.inf
         nearest = np.argsort(distances, kind="stable")[:_GUESS_KEYFRAMES]

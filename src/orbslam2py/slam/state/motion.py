@@ -33,24 +33,24 @@ class Motion:
     is_tracked: bool = False
     """The next frame follows the last one: the camera was not lost in between."""
     prediction_covariance: FloatArray | None = None
-    """(6, 6), of the next pose, whose motion `velocity` holds as an IMU predicts it; None without
-    one."""
+    """(6, 6), covariance of the pose that an IMU predicts for the next frame; None without an IMU.
+    The predicted motion is in `velocity`."""
     map_motion: core.Pose | None = None
     """Motion of the map under the last frame since it was tracked, by local bundle adjustment."""
 
     @property
     def last(self) -> core.TrackedFrame:
-        """The last frame with a pose, where there is one."""
+        """The last frame with a pose; only called when there is one."""
         assert self.last_frame is not None
         return self.last_frame
 
     # ---- what follows from it --------------------------------------------------------------------
     def predict(self, frame: core.TrackedFrame) -> None:
-        """Set the pose of a frame by constant velocity; without one, to that of the last frame."""
+        """Set the pose of a frame by constant velocity; to the last pose without a velocity."""
         core.predict_pose(frame, self.last, self.velocity)
 
     def prior(self) -> core.PosePrior | None:
-        """Return the predicted pose with its information, where an IMU predicts it."""
+        """Return the predicted pose and its information matrix; None without an IMU."""
         if self.prediction_covariance is None or self.velocity is None:
             return None
         T_lw = self.last.T_cw
@@ -66,9 +66,10 @@ class Motion:
         return max(1e-6, float(np.median(depths)))
 
     def deviation_in_image(self) -> float:
-        """Return the standard deviation [rad] of the directions of predicted points, by an IMU.
+        """Return the standard deviation [rad] of the directions of points that an IMU predicts.
 
-        It is that of points at the median depth of those that the last frame saw; 0 without an IMU.
+        It holds for a point at the median depth of the last frame's points. It is 0 without an IMU.
+        The search window of the motion model is three times as wide (`PoseSearch.by_motion_model`).
         """
         if self.prediction_covariance is None:
             return 0.0
@@ -108,7 +109,7 @@ class Motion:
         return replace(self, last_points=points, velocity=velocity, map_motion=moved)
 
     def after(self, frame: core.TrackedFrame) -> Motion:
-        """Measure the velocity, if the frame is consecutive, and make it the last one."""
+        """Make a frame the last one; measure the velocity if both frames are consecutive."""
         velocity = None
         if self.last_frame is not None and self.is_tracked:
             velocity = core.velocity_between(self.last_frame, frame, consecutive=True)

@@ -16,7 +16,7 @@ from orbslam2py.slam.state.scene import SceneStatistics
 
 @dataclass(frozen=True)
 class SinceKeyframe:
-    """What has been tracked since the last keyframe."""
+    """Tracking since the last keyframe."""
 
     frame_id: int = 0
     """The frame that became the last keyframe."""
@@ -50,7 +50,7 @@ class State:
     local_map: core.LocalMap | None = None
     """The local map of the last refined frame; None before the first."""
     since_keyframe: SinceKeyframe = field(default_factory=SinceKeyframe)
-    """What has been tracked since the last keyframe."""
+    """Tracking since the last keyframe."""
     n_uncertain: int = 0
     """Number of frames in a row with weak evidence."""
     is_scarce: bool = False

@@ -224,7 +224,8 @@ class Transitions:
             n_lost=0,
             seeks_map=False,
             unconfirmed=None,
-            # Beyond the map frames are tracked and searched at once: that search goes on.
+            # Outside the map, frames are tracked and relocalized at the same time; that search
+            # continues.
             lost=state.lost if state.unconfirmed is None else LostSearch(),
         )
         return after, tuple(actions)

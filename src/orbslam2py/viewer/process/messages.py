@@ -19,7 +19,8 @@ class Subject:
     fov: float
     """Vertical field of view of the camera [rad]."""
     with_scale: bool
-    """Whether the map has its own unit (a single camera)."""
+    """Whether lengths are in the map's own unit and not in metres (single camera without an
+    IMU)."""
     truth: Trajectory | None
     can_hold: bool
     """Whether the run can be paused, and continue image by image."""

@@ -189,7 +189,7 @@ CASES = {
     ),
     "pose of one place": Case(
         PAIR.replace(texts.pose_text(texts.T_C1_C2), texts.pose_text(np.eye(4))),
-        ("Stereo.T_c1_c2", "stand in one place"),
+        ("Stereo.T_c1_c2", "have the same position"),
         sensor="stereo",
     ),
     "rectified, with two cameras": Case(

@@ -98,8 +98,8 @@ def settings_for_another_sensor(folder: Path) -> list[object]:
 @pytest.mark.parametrize(
     ("make", "thing", "remedy"),
     [
-        (tum, "does not tell the camera", "give --settings tum1"),
-        (tum_mono, "does not tell the camera", "tum2 (freiburg2) or tum3 (freiburg3)"),
+        (tum, "does not identify the camera", "give --settings tum1"),
+        (tum_mono, "does not identify the camera", "tum2 (freiburg2) or tum3 (freiburg3)"),
         (tum_without_images, "first 4 images", "put them where the list says"),
         (tum_without_depth, "has no rgbd images", "can be used as: mono"),
         (images_of_tum_with_times_of_others, "the first is 100.250000.png", "a list of all images"),

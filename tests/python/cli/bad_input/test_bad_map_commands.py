@@ -147,7 +147,7 @@ def test_refused(
 def test_a_map_that_is_to_stay_as_it_is(command: CommandLine, rgbd: Path) -> None:
     done = command("run", rgbd, "--localize", 5, "--final-adjustment")
     assert done.code == 2
-    assert "--final-adjustment changes the map, which --localize leaves as it is" in done.err
+    assert "--final-adjustment changes the map, but --localize keeps it unchanged" in done.err
 
 
 def test_a_format_that_there_is_not(command: CommandLine) -> None:

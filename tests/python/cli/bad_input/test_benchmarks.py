@@ -29,7 +29,7 @@ def test_command(command: CommandLine, root: Path) -> None:
     assert str(folder / "benchmark.md") in done.out.replace("\n", "")
     again = command(*arguments)
     assert again.code == 2
-    assert "go on with --resume" in " ".join(again.err.split())
+    assert "continue with --resume" in " ".join(again.err.split())
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Failures inside: what was done until then is saved."""
+"""Failures inside: the results until then are saved."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_failure_inside(
     options = ("--deterministic",) if deterministic else ()
     done = run(command, rgbd, "rgbd", *options)
     assert done.code == 1
-    assert f"Error: {message} (what was done until then is saved)" in done.err
+    assert f"Error: {message} (the results until then are saved)" in done.err
     assert {path.name for path in Path("r").iterdir()} == RUN_FILES
     rows = Results(Path("r")).frames
     assert len(read_tum(Path("r/trajectory.txt"))) >= len(rows) >= 1
@@ -69,5 +69,5 @@ def test_failure_while_reading(
     monkeypatch.setattr(tum, "read_depth", After(tum.read_depth, 6))
     done = run(command, rgbd)
     assert done.code == 1
-    assert "Error: out of order (what was done until then is saved)" in done.err
+    assert "Error: out of order (the results until then are saved)" in done.err
     assert len(read_tum(Path("r/trajectory.txt"))) == 6

@@ -117,7 +117,7 @@ def test_half_of_a_pair(command: CommandLine, pair: Path) -> None:
 def test_one_series_for_stereo(command: CommandLine, pair: Path, tmp_path: Path) -> None:
     alone = Path(shutil.copytree(pair / "left", tmp_path / "alone" / "images"))
     done = run(command, alone, "stereo", *WITH)
-    expect_refused(done, f"its {N} images", "tell no left and right", LOOKS_LIKE, "--split")
+    expect_refused(done, f"its {N} images", "do not name left and right", LOOKS_LIKE, "--split")
 
 
 def test_nothing_fits(command: CommandLine, pair: Path) -> None:
@@ -132,7 +132,7 @@ def test_rgbd_of_a_pair(command: CommandLine, pair: Path) -> None:
     done = run(command, pair, "rgbd", *WITH)
     expect_refused(
         done,
-        "cannot tell which folder in",
+        "cannot decide which folder in",
         "has the images and which the depth: it has left (14 images",
         "or give one of these folders alone",
     )

@@ -110,7 +110,7 @@ def test_one_fisheye_camera(tmp_path: Path, D: tuple[float, ...], expected: bool
 @pytest.mark.parametrize(
     ("name", "left", "right", "message"),
     [
-        ("image_raw", {}, {}, "do not tell the distance of the two cameras"),
+        ("image_raw", {}, {}, "do not contain the distance of the two cameras"),
         ("image_rect", {}, {"bf": -3.0}, "stands to the left of the other one; exchange"),
         ("image_rect", {}, {"bf": 3.0, "K": K * 2}, "are no rectified pair: their P differ"),
         ("image_rect", {"size": (64, 48)}, {"bf": 3.0}, "is for 64 x 48 pixels, but images of"),

@@ -60,4 +60,4 @@ def test_without_an_imu(tmp_path, caplog):
     assert opened(tmp_path / "none", "mcap").imu() is None
     with caplog.at_level(logging.WARNING):
         assert opened(tmp_path / "half", "mcap", *samples("/gyro/sample")).imu() is None
-    assert "cannot tell gyro and accelerometer of /gyro/sample" in caplog.text
+    assert "cannot distinguish gyro and accelerometer of /gyro/sample" in caplog.text

@@ -114,7 +114,7 @@ def test_tables_that_hold_other_things(tmp_path: Path, statement: str) -> None:
 def test_a_connection_without_its_number(tmp_path: Path) -> None:
     path = small_bag(tmp_path, "rosbag1")
     path.write_bytes(path.read_bytes().replace(b"conn=", b"comm="))
-    with pytest.raises(orb.DatasetError, match=r"drive\.bag .*copy it anew"):
+    with pytest.raises(orb.DatasetError, match=r"drive\.bag .*copy it again"):
         BagSequence(path)
 
 

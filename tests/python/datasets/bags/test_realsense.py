@@ -103,8 +103,8 @@ def test_cameras_that_do_not_look_the_same_way_are_rectified(tmp_path: Path) -> 
         ({"T_stream_reference": None}, "no transform in the bag does"),
         ({"T_stream_reference": np.full((4, 4), np.nan)}, "no transform in the bag does"),
         ({"T_stream_reference": pose((0.1, 0, 0))}, "stands to the left of the other one; exch"),
-        ({"T_stream_reference": pose((0, -0.1, 0.01))}, r"do not stand side by side.*0\.100"),
-        ({"T_stream_reference": np.eye(4)}, "do not tell the distance of the two cameras"),
+        ({"T_stream_reference": pose((0, -0.1, 0.01))}, r"are not side by side.*0\.100"),
+        ({"T_stream_reference": np.eye(4)}, "do not contain the distance of the two cameras"),
         ({"reference": 7}, "no transform in the bag does"),  # a reference of its own
         ({"info": False}, r"no CameraInfo for /device_0/sensor_0/Infrared_2.*right_info=\.\.\."),
         ({"model": "F-Theta"}, "distortion model f-theta is not supported"),

@@ -114,7 +114,7 @@ def test_exchanged_cameras(tmp_path: Path) -> None:
         ),
         (
             [bags.frames("/tf_static", ("left_optical", "right_optical", shift(0.02, 0, 0.3)))],
-            "do not stand side by side",
+            "are not side by side",
         ),
     ],
 )

@@ -212,7 +212,7 @@ def test_registered_depth_goes_first(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("../cam_params.json", "{}", "does not tell the camera: it needs 'camera'"),
+        ("../cam_params.json", "{}", "does not describe the camera: it needs 'camera'"),
         ("../cam_params.json", None, "cam_params.json is missing"),
         ("traj.txt", "1 2 3\n", r"traj.txt:1: expected 16 numbers, found 3"),
         ("traj.txt", " ".join(["1"] * 16) + "\n", "has 1 poses for 4 images"),
@@ -233,7 +233,7 @@ def test_bad_replica(tmp_path: Path, name: str, text: str | None, message: str) 
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("sensors.yaml", "nothing: 1\n", "does not tell the colour camera"),
+        ("sensors.yaml", "nothing: 1\n", "does not describe the colour camera"),
         ("color.txt", "1.0\n", r"color.txt:1: expected 'timestamp path'"),
     ],
 )

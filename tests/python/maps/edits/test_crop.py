@@ -204,7 +204,7 @@ def test_shared_points_are_counted(n: int, seed: int) -> None:
 
 # ---- several maps --------------------------------------------------------------------------------
 def several_maps(*sizes: int, seed: int = 0) -> MapContents:
-    """Maps of so many keyframes, each in a world of its own."""
+    """Maps of so many keyframes, each in its own world frame."""
     maps = [made_up_map(n, 60, seed=seed + number) for number, n in enumerate(sizes)]
     return put_together([made_up_saved(contents) for contents in maps]).contents
 

@@ -88,7 +88,7 @@ def test_points_that_tell_nothing() -> None:
     contents = made_up_map()
     with pytest.raises(MapFileError, match="all at one place"):
         place_by_points(contents, np.ones((4, 3)), np.eye(4)[:, :3])
-    with pytest.raises(MapFileError, match=r"2 known points do not tell.*at least 3"):
+    with pytest.raises(MapFileError, match=r"2 known points do not determine.*at least 3"):
         place_by_points(contents, np.eye(3)[:2], np.eye(3)[:2])
 
 

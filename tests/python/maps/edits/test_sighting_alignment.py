@@ -142,7 +142,7 @@ def test_images_of_another_place(room: Room) -> None:
         world="corridor", sensor="mono", frames=30, size=(320, 240), fps=8, seed=5
     )
     other = SyntheticSequence(options)
-    with pytest.raises(DatasetError, match="they show something else than the map; give the"):
+    with pytest.raises(DatasetError, match="they do not show the map; give the"):
         align_sightings(room.contents, _with(room, load=other.load))
 
 
