@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ORB-SLAM2 for Python.
+"""Visual SLAM for Python.
 
 Feed images of one camera, a stereo pair or an RGB-D camera, get the camera's path and a map:
 
