@@ -80,7 +80,7 @@ STUBS := $(BIN)/python scripts/generate_stubs.py --check
 DOCS := NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 # All packages at once; each of the others installs its own if it is called alone.
-test: packages-package+cpp-tests+lint+docs+browser lint-and-test-cpp test-python last-checks
+test: packages-package+cpp-tests+lint+docs+browser+cameras lint-and-test-cpp test-python last-checks
 	@echo "All tests passed."
 
 # Python packages are downloaded while the compiler works.
@@ -97,7 +97,7 @@ test-cpp: | packages-package+cpp-tests
 	@cmake --build build/release -j $(JOBS)
 	@ctest --test-dir build/release --output-on-failure -j $(JOBS)
 
-test-python: install developer | packages-package+browser+docs
+test-python: install developer | packages-package+browser+docs+cameras
 	@$(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 lint: developer | packages-lint

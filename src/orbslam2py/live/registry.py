@@ -80,12 +80,17 @@ class Kind:
             raise DatasetError(self._missing(error)) from error
 
     def _missing(self, error: ImportError) -> str:
-        package = error.name or str(error)
         if self.extra is None:
             return f"{self.prefix}: cannot be used: {error}"
+        if not isinstance(error, ModuleNotFoundError):
+            return (
+                f"{self.prefix}: its Python package is installed but cannot be loaded: {error}; "
+                "install the library of the system that is missing (for libusb-1.0.so.0 on Debian: "
+                "sudo apt install libusb-1.0-0)"
+            )
         return (
-            f"{self.prefix}: needs the package {package}, which is not installed; install it: "
-            f'pip install "orbslam2py[{self.extra}]"'
+            f"{self.prefix}: needs the package {error.name or error}, which is not installed; "
+            f'install it: pip install "orbslam2py[{self.extra}]"'
         )
 
 

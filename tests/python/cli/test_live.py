@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from orbslam2py import Sensor, Settings
+from orbslam2py.errors import DatasetError
 from orbslam2py.live import KINDS, capture, registry
 from orbslam2py.trajectory import read_tum
 from support import made_kind
@@ -66,6 +69,20 @@ def test_run_and_repeat_it(command: CommandLine) -> None:
     assert len(i) >= N - 4  # a frame may have been dropped
     apart = np.linalg.norm(live.T_wc[i, :3, 3] - repeated.T_wc[j, :3, 3], axis=1)
     assert apart.max() < 0.02
+
+
+def test_a_missing_library_of_the_system_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "libusb-1.0.so.0: cannot open shared object file: No such file or directory"
+
+    def import_module(name: str) -> Any:
+        raise ImportError(text)
+
+    monkeypatch.setattr(importlib, "import_module", import_module)
+    with pytest.raises(DatasetError) as caught:
+        KINDS[0].find()
+    assert text in str(caught.value)
+    assert "apt install libusb-1.0-0" in str(caught.value)
+    assert "pip install" not in str(caught.value)
 
 
 @pytest.mark.usefixtures("made")

@@ -257,7 +257,7 @@ def test_what_is_played_again_stands_beside_what_is_not(tmp_path, monkeypatch):
     monkeypatch.setattr(
         program,
         "all_rows",
-        lambda cases, jobs: [row_of(case, figures) | {"wrong": 7} for case in cases],
+        lambda cases, jobs, changes: [row_of(case, figures) | {"wrong": 7} for case in cases],
     )
     monkeypatch.setattr("sys.argv", ["holding_on", "--csv", str(path), "--again"])
     program.main()

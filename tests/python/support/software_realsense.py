@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-rs: Any = pytest.importorskip("pyrealsense2", reason="pip install orbslam2py[realsense]")
+rs: Any = pytest.importorskip(
+    "pyrealsense2",
+    reason="pip install orbslam2py[realsense], and libusb-1.0-0 of the system",
+    exc_type=ImportError,
+)
 
 #: Stamps of the first images, milliseconds on a clock of the hardware.
 BEGIN = 5000.0
