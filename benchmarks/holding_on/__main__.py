@@ -14,6 +14,7 @@ the present code are in the CSV file and are not repeated.
     python -m benchmarks.holding_on --part block --runs 10
     python -m benchmarks.holding_on --part recorded --runs 248
     python -m benchmarks.holding_on --part images --runs 108
+    python -m benchmarks.holding_on --imu bmi088 --runs 78
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from __future__ import annotations
 import argparse
 import subprocess
 from collections.abc import Iterator
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -45,6 +47,7 @@ from benchmarks.holding_on.results import (
 )
 from benchmarks.holding_on.runs import all_rows
 from benchmarks.holding_on.scene import Case
+from orbslam2py.settings.imu_presets import IMU_NOISE
 from orbslam2py.slam.config import read_change
 
 
@@ -66,8 +69,13 @@ def main() -> None:
     parser.add_argument("--csv", type=Path, help="file of all runs [build/holding_on/COMMIT.csv]")
     parser.add_argument("--again", action="store_true", help="repeat the runs in the file, too")
     parser.add_argument("--set", nargs="+", metavar="NAME=VALUE", help="configuration", default=[])
+    parser.add_argument(
+        "--imu", choices=sorted(IMU_NOISE), help="longer runs with this IMU (motions)"
+    )
     add_width(parser)
     arguments = parser.parse_args()
+    if arguments.imu is not None and arguments.part != "motions":
+        parser.error(f"--imu goes with --part motions, not {arguments.part}")
     run(arguments, console_of(arguments))
 
 
@@ -96,7 +104,11 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
 def chosen_cases(arguments: argparse.Namespace) -> list[Case]:
     if arguments.part == "block":
         return list(block_cases(arguments.runs))
-    kinds = {"motions": motion_cases, "recorded": recorded_cases, "images": image_cases}
+    kinds = {
+        "motions": partial(motion_cases, chip=arguments.imu),
+        "recorded": recorded_cases,
+        "images": image_cases,
+    }
     every: Iterator[Case] = kinds[arguments.part](arguments.sensors)
     if arguments.only is not None:
         every = (case for case in islice(every, 100_000) if arguments.only in case.key)

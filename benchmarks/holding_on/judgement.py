@@ -58,6 +58,8 @@ class Figures:
     maps: int
     ate: float
     """Metres; of the last map's final path."""
+    with_imu: int
+    """Frames of which the IMU had a state."""
     loops: int
     seconds: float
     enough_parallax: float
@@ -105,6 +107,7 @@ def judge(played: Played) -> Figures:
         translation_spread=spread(error[:, 3:], deviation[:, 3:, 3:]),
         maps=len(np.unique(played.map_index[played.posed])),
         ate=absolute_error(played, with_scale=monocular),
+        with_imu=int(played.with_imu.sum()),
         loops=played.loops,
         seconds=played.seconds,
         enough_parallax=start.enough_parallax,

@@ -95,6 +95,8 @@ IMAGES: dict[str, dict[str, Any]] = {
     "half the contrast": {"noise": 1.0, "exposure": 0.5},
     "double contrast": {"noise": 1.0, "exposure": 2.0},
 }
+#: The IMU starts after some seconds: runs with it are this many times as long.
+_LONGER_WITH_IMU = 3
 _SEEN_BY = [
     {"world": "corridor", "frames": 100, "size": INDOORS},
     {"world": "room", "frames": 100, "size": INDOORS},
@@ -109,6 +111,8 @@ class MadeUpScene:
         self.sequence = SyntheticSequence(options)
         self.sensor = Sensor(options.sensor)
         self.settings = with_features(self.sequence.default_settings(), features)
+        self.imu = self.sequence.imu_settings() if options.imu else None
+        self.samples = self.sequence.imu()
         self.timestamps = self.sequence.timestamps
         self.truth_variance = np.zeros(6)
         self.fps = self.sequence.camera.fps
@@ -175,12 +179,15 @@ class MadeUpCase:
         World and motion.
     sensor, features, seed
         Of the run; the seed is that of the world, of its motion and of the system.
+    chip
+        Name of the IMU; None without one.
     """
 
     of: Situation
     sensor: str
     features: int
     seed: int
+    chip: str | None = None
 
     @property
     def situation(self) -> str:
@@ -191,11 +198,15 @@ class MadeUpCase:
     def key(self) -> str:
         """Key that identifies the run."""
         world = f" | {self.of.options['world']}" if self.situation in IMAGES else ""
-        return f"{self.situation}{world} | {self.sensor} | {self.features} | {self.seed}"
+        chip = f" | {self.chip}" if self.chip is not None else ""
+        return f"{self.situation}{world} | {self.sensor} | {self.features} | {self.seed}{chip}"
 
     def options(self) -> SyntheticOptions:
         """Options of the sequence."""
         options: dict[str, Any] = {"noise": 1.5, "depth_noise": 0.002, **self.of.options}
+        if self.chip is not None:
+            longer = _LONGER_WITH_IMU * options["frames"]
+            options |= {"imu": True, "imu_noise": self.chip, "frames": longer}
         return SyntheticOptions(sensor=self.sensor, seed=self.seed, **options)
 
     def scene(self) -> MadeUpScene:
@@ -213,7 +224,7 @@ def with_features(settings: Settings, features: int) -> Settings:
     return dataclasses.replace(settings, orb=dataclasses.replace(settings.orb, n_features=features))
 
 
-def motion_cases(sensors: Sequence[str]) -> Iterator[MadeUpCase]:
+def motion_cases(sensors: Sequence[str], chip: str | None = None) -> Iterator[MadeUpCase]:
     """Endless: every round plays all situations, with other sensors, features and a new seed.
 
     The first ones are as mixed as all of them, so any number of runs is a fair sample.
@@ -224,7 +235,7 @@ def motion_cases(sensors: Sequence[str]) -> Iterator[MadeUpCase]:
         situation = SITUATIONS[place]
         sensor = sensors[(turn + place) % len(sensors)]
         features = FEATURES[(turn // len(sensors) + place) % len(FEATURES)]
-        yield MadeUpCase(situation, sensor, features, seed=turn)
+        yield MadeUpCase(situation, sensor, features, turn, chip)
         number += 1
 
 

@@ -47,6 +47,8 @@ class Played:
         (n,) which map the pose is in.
     changed
         Frames before which a loop had moved the map, (n,).
+    with_imu
+        Frames of which the IMU had a state, (n,).
     covered
         Frames with a hand over the lens, (n,).
     path
@@ -65,6 +67,7 @@ class Played:
     keyframe: Flags
     map_index: Integers
     changed: Flags
+    with_imu: Flags
     covered: Flags
     path: Floats
     loops: int
@@ -81,11 +84,19 @@ def play(case: Case, config: Mapping[str, Any] | None = None) -> Played:
     nowhere, unknown = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
     motion = np.tile(nowhere, (n, 1, 1))
     system = orb.System(
-        scene.settings, scene.sensor, deterministic=True, seed=case.seed, config=config
+        scene.settings,
+        scene.sensor,
+        deterministic=True,
+        seed=case.seed,
+        imu=scene.imu,
+        config=config,
     )
     with system as slam:
+        before = None
         for i, timestamp in enumerate(scene.timestamps):
-            records.append(slam.track(scene.load(i), float(timestamp)))
+            samples = None if scene.samples is None else scene.samples.since(before, timestamp)
+            records.append(slam.track(scene.load(i), float(timestamp), imu=samples))
+            before = timestamp
             changes[i] = slam.pipeline.back_end.map.big_change_index
             velocity = slam.pipeline.tracking.motion.velocity
             if velocity is not None:
@@ -105,6 +116,7 @@ def play(case: Case, config: Mapping[str, Any] | None = None) -> Played:
         keyframe=np.array([r.is_keyframe for r in records]),
         map_index=np.array([r.map_index for r in records]),
         changed=np.diff(changes, prepend=0) != 0,
+        with_imu=np.array([r.inertial is not None for r in records]),
         covered=np.array([scene.covered(i) for i in range(n)]),
         path=path,
         loops=system.n_loops_closed,

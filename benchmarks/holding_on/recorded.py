@@ -250,6 +250,7 @@ class RecordedScene:
         self._sequence = _opened(recording.name, sensor)
         self._recording = recording
         self.sensor, self.near = sensor, recording.near
+        self.imu = self.samples = None
         degrees, metres = recording.truth_deviation
         self.truth_variance = np.repeat([np.radians(degrees) ** 2, metres**2], 3)
         random = np.random.default_rng(seed)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py.datasets import Images
-from orbslam2py.settings import Sensor, Settings
+from orbslam2py.inertial.samples import ImuSamples
+from orbslam2py.settings import ImuSettings, Sensor, Settings
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -41,12 +42,16 @@ class Scene(Protocol):
         (n,) which part of the truth a frame's pose is of: what lies between two parts is not known.
     truth_variance
         (6,) of its motions from frame to frame, rotation [rad^2] and translation [m^2].
+    imu, samples
+        The IMU beside the camera and its samples; None without.
     near
         Metres within which two views in the same direction see the same place.
     """
 
     sensor: Sensor
     settings: Settings
+    imu: ImuSettings | None
+    samples: ImuSamples | None
     timestamps: Floats
     truth_variance: Floats
     fps: float

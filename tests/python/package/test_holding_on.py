@@ -57,6 +57,7 @@ def honest_run(**options) -> Played:
         keyframe=np.arange(N) % 10 == 0,
         map_index=np.zeros(N, np.int64),
         changed=np.zeros(N, bool),
+        with_imu=np.zeros(N, bool),
         covered=np.array([scene.covered(i) for i in range(N)]),
         path=np.linalg.inv(truth),
         loops=0,
@@ -209,6 +210,14 @@ def test_a_round_plays_all_kinds_of_images_with_all_sensors_in_all_worlds():
         some = [case for case in cases if case.situation == name]
         assert len({(case.sensor, case.of.options["world"]) for case in some}) == 9
         assert {case.options().noise for case in some} == {kind["noise"]}
+
+
+def test_with_an_imu_the_run_is_longer_and_the_imu_starts():
+    situation = Situation("try", {"world": "corridor", "frames": 40, "size": (320, 240)})
+    played = play(MadeUpCase(situation, "stereo", 1000, 1, chip="bmi088"))
+    assert len(played.posed) == 120
+    assert judge(played).with_imu == played.with_imu.sum() > 20
+    assert not played.with_imu[:20].any()
 
 
 def test_an_interrupted_file_is_read_and_made_whole(tmp_path):
