@@ -6,6 +6,7 @@ from orbslam2py.maps.compare import map_differences
 from orbslam2py.maps.content_groups import (
     Cameras,
     Covisibility,
+    ImuStates,
     Keyframes,
     Observations,
     Points,
@@ -56,6 +57,7 @@ __all__ = [
     "ImageOfKeyframe",
     "ImagePairSequence",
     "ImageSequence",
+    "ImuStates",
     "Keyframes",
     "KeyframesSet",
     "MapArrays",

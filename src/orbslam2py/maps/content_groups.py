@@ -358,6 +358,47 @@ class RemovedKeyframes(ArrayGroup):
         return len(self.ids)
 
 
+@dataclass(frozen=True, eq=False)
+class ImuStates(ArrayGroup):
+    """States of the IMU at keyframes: (m,) entries each, then (s,) samples between them.
+
+    The samples from the entry before to entry i are ``offsets[i]:offsets[i + 1]``. They are raw
+    ones, because what is integrated of them depends on the biases.
+    """
+
+    ids: IntArray
+    """(m,) ids of keyframes, ascending."""
+    velocity: FloatArray
+    """(m, 3) of the IMU, in the axes of the keyframe's camera, in units of the map per second if
+    `Keyframes.scale` is `scale`; else it is to be multiplied by the quotient of both."""
+    scale: FloatArray
+    """(m,) `Keyframes.scale` when the velocity was stored."""
+    bias: FloatArray
+    """(m, 6) gyro [rad/s], accelerometer [m/s^2]."""
+    offsets: IntArray
+    """(m + 1,) offsets into `samples`."""
+    samples: FloatArray
+    """(s, 7) ``[t, gyro, accelerometer]``: seconds on the clock of the images, rad/s, m/s^2, in the
+    frame of the IMU. Those of an entry cover the time from the keyframe of the entry before, so
+    that the last ones of one entry may be the first ones of the next. An entry has none if samples
+    do not join the two keyframes."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @classmethod
+    def none(cls) -> ImuStates:
+        """No states."""
+        return cls(
+            np.zeros(0, np.int64),
+            np.zeros((0, 3)),
+            np.zeros(0),
+            np.zeros((0, 6)),
+            np.zeros(1, np.int64),
+            np.zeros((0, 7)),
+        )
+
+
 def _row_of(ids: IntArray, wanted: int, what: str) -> int:
     row = int(np.searchsorted(ids, wanted))
     if row == len(ids) or ids[row] != wanted:

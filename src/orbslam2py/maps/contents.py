@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +20,7 @@ from orbslam2py.maps.content_groups import (
     ArrayGroup,
     Cameras,
     Covisibility,
+    ImuStates,
     Int32Array,
     Keyframes,
     Observations,
@@ -29,6 +30,8 @@ from orbslam2py.maps.content_groups import (
 
 #: They follow from the descriptors and the vocabulary.
 _WORDS = "keyframes.words"
+#: Left out of the hash of a map without them, which is that of before there were any.
+_IMU = "imu_states."
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,8 @@ class MapContents:
     upright_roots: tuple[int, ...] = ()
     """First keyframes of maps whose third axis is up and whose unit is the metre, by an IMU,
     ascending."""
+    imu_states: ImuStates = field(default_factory=ImuStates.none)
+    """What an IMU measured at and between keyframes; none without an IMU."""
 
     def observations_of_point(self, point_id: int) -> tuple[IntArray, Int32Array]:
         """Return the observations of a point.
@@ -137,13 +142,13 @@ class MapContents:
 
     def arrays(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """All arrays with their names (``"points.positions"``), in a fixed order."""
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
+        for one in dataclasses.fields(self):
+            value = getattr(self, one.name)
             if isinstance(value, ArrayGroup):
                 for name, array in value.arrays():
-                    yield f"{field.name}.{name}", array
+                    yield f"{one.name}.{name}", array
             elif isinstance(value, np.ndarray):
-                yield field.name, value
+                yield one.name, value
 
     def as_dict(self) -> dict[str, Any]:
         """All arrays and numbers by name, for the C++ core."""
@@ -176,7 +181,7 @@ class MapContents:
         """SHA-256 over all but `map_index` and words: equal for maps that are equal bit by bit."""
         digest = hashlib.sha256(f"{self.next_keyframe} {self.next_point}".encode())
         for name, array in self.arrays():
-            if name == _WORDS:
+            if name == _WORDS or (name.startswith(_IMU) and not len(self.imu_states)):
                 continue
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)

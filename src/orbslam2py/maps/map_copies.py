@@ -15,12 +15,14 @@ from orbslam2py.maps.content_groups import (
     BoolArray,
     Cameras,
     Covisibility,
+    ImuStates,
     Keyframes,
     Observations,
     Points,
     RemovedKeyframes,
 )
 from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.imu_states import check_states, put_states, take_states
 from orbslam2py.maps.units import sees_metres
 
 #: What the core has no need to know: which of its maps were given metres, and since which epoch.
@@ -45,9 +47,15 @@ class ChangedContents:
     """(m,) numbers of pages of `IDS_PER_PAGE` ids: points on other pages have not changed."""
     incomplete_pages: IntArray
     """(i,) pages among them with points whose keyframes local mapping has not processed yet."""
+    imu_versions: IntArray
+    """(m, 3) of the states of the IMU, as of `take_states` ..."""
+    changed_states: BoolArray
+    """... and (m,) which of them may have changed; the samples of the others are left out."""
 
 
-def take_contents(slam_map: core.Map) -> MapContents:
+def take_contents(
+    slam_map: core.Map, inertial: core.InertialKeyframes | None = None
+) -> MapContents:
     """Copy a whole map at one moment; the system may be running.
 
     Keyframes that local mapping has not processed yet, and points that only they see, are left out.
@@ -56,12 +64,17 @@ def take_contents(slam_map: core.Map) -> MapContents:
     ----------
     slam_map
         The map.
+    inertial
+        Who has the states of an IMU at its keyframes; None: nobody.
     """
-    return take_changes(slam_map, np.zeros(0, np.int64), None).contents
+    return take_changes(slam_map, np.zeros(0, np.int64), None, inertial).contents
 
 
 def take_changes(
-    slam_map: core.Map, known_keyframes: IntArray, before: ChangedContents | None
+    slam_map: core.Map,
+    known_keyframes: IntArray,
+    before: ChangedContents | None,
+    inertial: core.InertialKeyframes | None = None,
 ) -> ChangedContents:
     """Copy possible changes of a map since an earlier copy, without the counters of tracking.
 
@@ -73,6 +86,8 @@ def take_changes(
         Ids (m,), ascending, of keyframes whose keypoints are left out, because they never change.
     before
         The earlier copy of the same map (`MapContents.map_index`); None if there is none.
+    inertial
+        As of `take_contents`.
     """
     since: dict[str, Any] = {}
     if before is not None:
@@ -99,7 +114,16 @@ def take_changes(
     if epoch == contents.map_index:  # else it was emptied since, and ids began anew
         contents = replace(contents, metric_roots=living_roots(roots, contents.keyframes))
     contents = _with_upright_roots(contents, slam_map)
-    return ChangedContents(contents, **groups["known"])
+    versions, changed = np.zeros((0, 3), np.int64), np.zeros(0, bool)
+    if inertial is not None:
+        known = versions if before is None else before.imu_versions
+        states, versions, changed = take_states(inertial, contents.keyframes, known)
+        if slam_map.epoch != contents.map_index:  # it was emptied meanwhile, and ids begin anew
+            states, versions, changed = ImuStates.none(), versions[:0], changed[:0]
+        contents = replace(contents, imu_states=states)
+    return ChangedContents(
+        contents, **groups["known"], imu_versions=versions, changed_states=changed
+    )
 
 
 def restore_contents(
@@ -109,6 +133,7 @@ def restore_contents(
     index: core.KeyFrameIndex | None = None,
     *,
     words_fit: bool = False,
+    inertial: core.InertialKeyframes | None = None,
 ) -> core.Map:
     """Make a map of its contents.
 
@@ -124,6 +149,8 @@ def restore_contents(
         Gets the keyframes with their words.
     words_fit
         The words in the contents are of this vocabulary and need not be computed again.
+    inertial
+        Gets the states of the IMU.
 
     Raises
     ------
@@ -135,9 +162,12 @@ def restore_contents(
         slam_map = core.Map()
     arrays = contents.as_dict()
     keyframes = contents.keyframes
+    check_states(contents.imu_states, keyframes.ids, keyframes.timestamps)
     restorer = core.MapRestorer(arrays, len(keyframes.keypoints), vocabulary, words_fit)
     restorer.add(arrays, len(keyframes))
     restorer.finish(slam_map, index)
+    if inertial is not None:
+        put_states(contents.imu_states, inertial)
     remember_metric_roots(slam_map, contents.metric_roots)
     set_upright(slam_map, contents.upright_roots)
     return slam_map

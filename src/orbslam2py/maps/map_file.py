@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from orbslam2py import _core as core
 from orbslam2py._arguments import path_of
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import contents_of
+from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.imu_states import check_states, put_states
 from orbslam2py.maps.map_copies import remember_metric_roots, set_upright
 from orbslam2py.maps.map_reader import check_contents, check_frames, opened, read_head
 from orbslam2py.maps.map_rows import all_rows
@@ -75,8 +76,9 @@ class MapFile:
         """
         with self._opened() as stored:
             rest = stored.without_keypoints()
-            core.MapRestorer(rest, stored.n_keypoints)
-            check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
+            arrays = rest.as_dict()
+            core.MapRestorer(arrays, stored.n_keypoints)
+            self._check(rest)
             for _ in stored.keypoint_parts():
                 pass  # their checksums and sizes are looked at
 
@@ -85,6 +87,7 @@ class MapFile:
         slam_map: core.Map,
         vocabulary: core.Vocabulary | None = None,
         index: core.KeyFrameIndex | None = None,
+        inertial: core.InertialKeyframes | None = None,
     ) -> None:
         """Make the map.
 
@@ -97,6 +100,8 @@ class MapFile:
             this vocabulary.
         index
             Gets the keyframes with their words.
+        inertial
+            Gets the states of the IMU.
 
         Raises
         ------
@@ -107,13 +112,22 @@ class MapFile:
         with self._opened() as stored:
             fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
             rest = stored.without_keypoints()
-            restorer = core.MapRestorer(rest, stored.n_keypoints, vocabulary, fits)
-            check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
+            arrays = rest.as_dict()
+            restorer = core.MapRestorer(arrays, stored.n_keypoints, vocabulary, fits)
+            self._check(rest)
             for part, n_keyframes in stored.keypoint_parts():
                 restorer.add(part, n_keyframes)
             restorer.finish(slam_map, index)
+            if inertial is not None:
+                put_states(rest.imu_states, inertial)
         remember_metric_roots(slam_map, self.metric_roots)
         set_upright(slam_map, self.upright_roots)
+
+    def _check(self, contents: MapContents) -> None:
+        """Check what the core does not check."""
+        keyframes = contents.keyframes
+        check_frames(self.runs, keyframes.ids, contents.removed_keyframes.ids)
+        check_states(contents.imu_states, keyframes.ids, keyframes.timestamps)
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[MapTables]:

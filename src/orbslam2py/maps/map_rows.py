@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import IntArray
-from orbslam2py.maps.content_groups import Covisibility, Keyframes, model_name_of
+from orbslam2py.maps.content_groups import Covisibility, ImuStates, Keyframes, model_name_of
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.saved_map import Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.schema import (
@@ -77,7 +77,9 @@ def run_rows(number: int, run: Run, *, first_part: int = 0) -> Iterator[tuple[st
 
 # ---- the map ----------------------------------------------------------------------------------
 def map_rows(
-    contents: MapContents, changed_keyframes: NDArray[np.bool_] | None = None
+    contents: MapContents,
+    changed_keyframes: NDArray[np.bool_] | None = None,
+    changed_states: NDArray[np.bool_] | None = None,
 ) -> Iterator[tuple[str, Row]]:
     """All of the map but the keypoints of keyframes, as (table, row).
 
@@ -87,6 +89,8 @@ def map_rows(
         The map.
     changed_keyframes
         (k,) mask of the keyframes; all by default.
+    changed_states
+        (m,) mask of the states of the IMU; all by default.
     """
     if changed_keyframes is None:
         changed_keyframes = np.ones(len(contents.keyframes), bool)
@@ -104,6 +108,9 @@ def map_rows(
         yield "covisibility", (keyframe, *_blobs(TABLES["covisibility"], edges, which))
     for a, b in contents.loop_edges.tolist():
         yield "loop_edges", (a, b)
+    states = contents.imu_states
+    rows = range(len(states)) if changed_states is None else np.flatnonzero(changed_states)
+    yield from _imu_rows(states, rows)
 
 
 def keypoint_rows(
@@ -198,6 +205,22 @@ def _removed_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
     for row, keyframe in enumerate(removed.ids.tolist()):
         scales = float(removed.scale[row]), float(removed.parent_scale[row])
         yield "removed_keyframes", (keyframe, int(removed.parent[row]), poses[row], *scales)
+
+
+def _imu_rows(states: ImuStates, rows: Iterable[int]) -> Iterator[tuple[str, Row]]:
+    velocities, biases = states.velocity.astype("<f8"), states.bias.astype("<f8")
+    for row in rows:
+        samples = slice(int(states.offsets[row]), int(states.offsets[row + 1]))
+        yield (
+            "imu_states",
+            (
+                int(states.ids[row]),
+                velocities[row],
+                float(states.scale[row]),
+                biases[row],
+                *_blobs(TABLES["imu_states"], states, samples),
+            ),
+        )
 
 
 def _page_rows(name: str, group: object, ids: IntArray) -> Iterator[tuple[str, Row]]:

@@ -8,8 +8,9 @@ from typing import NamedTuple
 #: Tells map files from other SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
 #: Version of the format that is written; later ones are refused. Version 1 had no words, and
-#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses, version 4 no rigs.
-FORMAT_VERSION = 5
+#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses, version 4 no rigs, version 5
+#: neither states of an IMU.
+FORMAT_VERSION = 6
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
 #: Programs that know nothing of it take it for a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
@@ -79,6 +80,8 @@ FRAMES = (
     Blob("poses", "T_cr", "<f8", 7),
     Blob("lost", "lost", "|u1"),
 )
+#: Of an IMU, since version 6; rows ``[t, gyro, accelerometer]``.
+IMU_SAMPLES = (Blob("samples", "samples", "<f8", 7),)
 
 
 class Table(NamedTuple):
@@ -145,9 +148,14 @@ TABLES = {
         Table("observations", ("page",), (), OBSERVATIONS),
         Table("covisibility", ("keyframe",), (), COVISIBILITY),
         Table("loop_edges", ("a", "b")),
+        # Blobs of float64 (3,) and (6,), for the reason that a pose is one.
+        Table("imu_states", ("keyframe",), ("velocity", "scale", "bias"), IMU_SAMPLES),
         Table("frames", ("run", "part"), (), FRAMES),
     )
 }
+
+#: The first version with a table that version 1 did not have.
+_SINCE = {"imu_states": 6}
 
 
 def tables_of(version: int) -> dict[str, Table]:
@@ -162,7 +170,8 @@ def tables_of(version: int) -> dict[str, Table]:
         older["cameras"] = cameras._replace(values=values)
     if version < 2:
         older["keypoints"] = Table("keypoints", ("keyframe",), (), KEYPOINTS[:-1])
-    return {**TABLES, **older}
+    tables = {**TABLES, **older}
+    return {name: table for name, table in tables.items() if version >= _SINCE.get(name, 1)}
 
 
 def _blob_columns(blobs: tuple[Blob, ...]) -> str:
@@ -182,9 +191,10 @@ def create_script(version: int = FORMAT_VERSION) -> str:
     rational_lens = "".join(f"  {name} REAL NOT NULL,\n" for name in lens)
     fisheye = "  model TEXT NOT NULL,\n  lens BLOB NOT NULL,\n" if version >= 4 else ""
     fisheye += "  mount BLOB NOT NULL,\n" if version >= 5 else ""
-    return _CREATE.format(
+    script = _CREATE.format(
         version=version, keypoints=keypoints, rational_lens=rational_lens, fisheye_lens=fisheye
     )
+    return script + "".join(_CREATE_LATER[name] for name in tables if name in _CREATE_LATER)
 
 
 #: Bytes at the beginning of a file that say whose SQLite file it is.
@@ -198,6 +208,19 @@ def application_of(header: bytes) -> int | None:
     return int.from_bytes(header[68:72], "big")
 
 
+_CREATE_LATER = {
+    "imu_states": f"""
+CREATE TABLE imu_states (
+  keyframe INTEGER PRIMARY KEY
+    REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  velocity BLOB NOT NULL,
+  scale REAL NOT NULL,
+  bias BLOB NOT NULL,
+  {_blob_columns(IMU_SAMPLES)}
+  checksum INTEGER NOT NULL
+) STRICT;
+""",
+}
 _CREATE = f"""
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {{version}};

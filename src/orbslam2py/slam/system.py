@@ -27,7 +27,6 @@ from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.inertial.samples import ImuSamples
 from orbslam2py.maps.contents import MapContents
-from orbslam2py.maps.map_copies import take_contents
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.maps.saved_map import SavedMap
@@ -601,7 +600,7 @@ class System:
 
     def map_contents(self) -> MapContents:
         """Return all data of the map as arrays; may be called while the system runs."""
-        return take_contents(self.pipeline.back_end.map)
+        return self.pipeline.keeper.contents()
 
     @property
     def imu_check(self) -> ImuCheck | None:

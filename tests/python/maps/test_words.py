@@ -89,7 +89,7 @@ def test_known_words_are_not_searched_again() -> None:
     assert take_contents(restored).keyframes.words[7] == 5
 
 
-@pytest.mark.parametrize("version", [1, 2, 3, 4])
+@pytest.mark.parametrize("version", [1, 2, 3, 4, 5])
 def test_a_map_of_an_earlier_version_is_used_like_any(tmp_path: Path, version: int) -> None:
     old, new = written_as_version(version, tmp_path), written(tmp_path)
     saved = load_map(old)

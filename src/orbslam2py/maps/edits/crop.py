@@ -19,6 +19,7 @@ from orbslam2py.maps.edits.spanning_tree import (
     map_numbers,
     spanning_parents,
 )
+from orbslam2py.maps.imu_states import states_of_part
 
 BoolArray = NDArray[np.bool_]
 
@@ -174,6 +175,7 @@ def keep_keyframes(
         loop_edges=contents.loop_edges[np.isin(contents.loop_edges, keyframes.ids).all(axis=1)],
         metric_roots=roots_now(contents.metric_roots),
         upright_roots=roots_now(contents.upright_roots),
+        imu_states=states_of_part(contents.imu_states, keyframes),
     )
     cropped = _select_points(cropped, np.isin(contents.points.ids, observations.point))
     root = int(keyframes.ids[0])
@@ -296,8 +298,10 @@ def _renumbered(contents: MapContents, root: int) -> MapContents:
     # Points that the old keyframe 0 made were not made by the new one.
     reference = new(points.reference_keyframe)
     made_by_old = points.first_keyframe == 0
+    states = contents.imu_states
     return replace(
         contents,
+        imu_states=replace(states, ids=new(states.ids)),
         keyframes=replace(keyframes, ids=new(keyframes.ids), parent=new(keyframes.parent)),
         removed_keyframes=replace(
             contents.removed_keyframes, parent=new(contents.removed_keyframes.parent)

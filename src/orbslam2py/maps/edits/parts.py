@@ -20,6 +20,7 @@ from orbslam2py.maps.content_groups import (
     BoolArray,
     Cameras,
     Covisibility,
+    ImuStates,
     Keyframes,
     Observations,
     Points,
@@ -242,6 +243,9 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
     keyframes = together(Keyframes, keyframes_of, ids=keyframe, parent=keyframe, camera=camera)
     counts = [np.diff(part.keyframes.offsets) for part in parts]
     offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
+    states = together(ImuStates, lambda part: part.imu_states, ids=keyframe)
+    n_samples = np.concatenate([np.diff(part.imu_states.offsets) for part in parts])
+    samples_end = np.concatenate([[0], np.cumsum(n_samples)]).astype(np.int64)
     return replace(
         parts[0],
         map_index=0,
@@ -276,6 +280,7 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
             for part, by in zip(parts, keyframe[:-1].tolist(), strict=True)
             for root in part.upright_roots
         ),
+        imu_states=replace(states, offsets=samples_end),
     )
 
 

@@ -152,7 +152,13 @@ def align_sightings(
     # No keyframe comes or goes, and nothing here knows the vocabulary.
     keyframes = replace(refined.keyframes, words=contents.keyframes.words)
     record = _record(alignment, images, error_before, used, time.perf_counter() - began)
-    return replace(refined, map_index=contents.map_index, keyframes=keyframes), record
+    refined = replace(
+        refined,
+        map_index=contents.map_index,
+        keyframes=keyframes,
+        imu_states=contents.imu_states,
+    )
+    return refined, record
 
 
 class _Images:
