@@ -72,7 +72,9 @@ void InertialKeyframes::set(KeyFrameId keyframe, const Eigen::Vector3d& velocity
 
 void InertialKeyframes::set_state(KeyFrameId keyframe, const Eigen::Vector3d& velocity,
                                   const ImuBias& bias, double scale) {
-  states_[keyframe] = {velocity, bias, scale, samples_.size() - 1, ++n_changes_};
+  const auto [state, is_new] = states_.try_emplace(keyframe);
+  const std::size_t stretch = is_new ? samples_.size() - 1 : state->second.stretch;
+  state->second = {velocity, bias, scale, stretch, ++n_changes_};
 }
 
 void InertialKeyframes::clear() {

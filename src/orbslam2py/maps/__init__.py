@@ -4,11 +4,13 @@
 from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
 from orbslam2py.maps.compare import map_differences
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     Cameras,
     Covisibility,
     ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
@@ -51,6 +53,7 @@ from orbslam2py.maps.snapshot import (
 from orbslam2py.maps.verify import verify_map_file
 
 __all__ = [
+    "AlignedSightings",
     "AlignmentRecord",
     "Cameras",
     "Covisibility",
@@ -67,6 +70,7 @@ __all__ = [
     "MapFollower",
     "MapSnapshot",
     "Observations",
+    "Patches",
     "Placement",
     "Points",
     "PointsSet",

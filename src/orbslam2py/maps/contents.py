@@ -17,6 +17,7 @@ from orbslam2py._arguments import instance_of
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     ArrayGroup,
     Cameras,
     Covisibility,
@@ -24,6 +25,7 @@ from orbslam2py.maps.content_groups import (
     Int32Array,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
@@ -31,7 +33,7 @@ from orbslam2py.maps.content_groups import (
 #: They follow from the descriptors and the vocabulary.
 _WORDS = "keyframes.words"
 #: Left out of the hash of a map without them, which is that of before there were any.
-_IMU = "imu_states."
+_LATER = ("imu_states", "patches", "aligned", "alignment_noise")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,13 @@ class MapContents:
     ascending."""
     imu_states: ImuStates = field(default_factory=ImuStates.none)
     """What an IMU measured at and between keyframes; none without an IMU."""
+    patches: Patches = field(default_factory=Patches.none)
+    """What sightings of the points are aligned to."""
+    aligned: AlignedSightings = field(default_factory=AlignedSightings.none)
+    """Sightings that were aligned to these patches."""
+    alignment_noise: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    """(2, 2): of positions and of right columns the standard deviation of aligned sightings over
+    that of corners, and how often it was measured; (0, 2) if nothing was."""
 
     def observations_of_point(self, point_id: int) -> tuple[IntArray, Int32Array]:
         """Return the observations of a point.
@@ -181,7 +190,7 @@ class MapContents:
         """SHA-256 over all but `map_index` and words: equal for maps that are equal bit by bit."""
         digest = hashlib.sha256(f"{self.next_keyframe} {self.next_point}".encode())
         for name, array in self.arrays():
-            if name == _WORDS or (name.startswith(_IMU) and not len(self.imu_states)):
+            if name == _WORDS or self._is_missing(name.split(".")[0]):
                 continue
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)
@@ -190,6 +199,18 @@ class MapContents:
         if self.upright_roots:
             digest.update(f"\nupright_roots {self.upright_roots}".encode())
         return digest.hexdigest()
+
+    def _is_missing(self, group: str) -> bool:
+        return group in _LATER and not len(getattr(self, group))
+
+    def without_patches(self) -> MapContents:
+        """Return the map without patches, and without the sightings that were aligned to them."""
+        return dataclasses.replace(
+            self,
+            patches=Patches.none(),
+            aligned=AlignedSightings.none(),
+            alignment_noise=np.zeros((0, 2)),
+        )
 
 
 def contents_of(value: Any) -> MapContents:

@@ -29,6 +29,7 @@ from orbslam2py.maps.map_file import MapFile, save_map
 from orbslam2py.maps.map_rows import Row, keypoint_rows, map_rows, run_rows, settings_rows
 from orbslam2py.maps.map_writer import MapWriter
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
+from orbslam2py.maps.schema import IDS_PER_PAGE, PATCHES_PER_PAGE
 from orbslam2py.settings.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -66,6 +67,8 @@ class MapAutosave:
         The file that the map was loaded from.
     inertial : orbslam2py._core.InertialKeyframes, optional
         Who has the states of an IMU at keyframes.
+    patches : bool
+        Keep the patches of points, and the sightings that were aligned to them.
     """
 
     def __init__(
@@ -79,9 +82,11 @@ class MapAutosave:
         options: Mapping[str, Any],
         earlier: SavedMap | MapFile | None,
         inertial: core.InertialKeyframes | None = None,
+        patches: bool = True,
     ) -> None:
         self._map = slam_map
         self._inertial = inertial
+        self._patches = patches
         self._recorded = recorded
         self._settings = settings
         self._vocabulary = vocabulary
@@ -124,7 +129,7 @@ class MapAutosave:
     # ---- whole files -----------------------------------------------------------------------------
     def contents(self) -> MapContents:
         """Return the map as arrays, at this moment."""
-        return take_contents(self._map, self._inertial)
+        return take_contents(self._map, self._inertial, patches=self._patches)
 
     def saved_map(self) -> SavedMap:
         """Return all that a map file contains, at this moment."""
@@ -189,7 +194,7 @@ class MapAutosave:
             The state of the file: only later changes are examined. None: everything.
         """
         known = np.array(sorted(key[0] for key in writer.keys("keypoints")), np.int64)
-        return take_changes(self._map, known, before, self._inertial)
+        return take_changes(self._map, known, before, self._inertial, patches=self._patches)
 
     def update(
         self, writer: MapWriter, changes: ChangedContents, *, partly: bool, gently: bool = False
@@ -220,6 +225,12 @@ class MapAutosave:
             "imu_states": _keys(contents.imu_states.ids[~changes.changed_states]),
             "map_points": writer.keys("map_points") - looked_at,
             "observations": writer.keys("observations") - looked_at,
+            "patches": {
+                page
+                for page in writer.keys("patches")
+                if (page[0] * PATCHES_PER_PAGE // IDS_PER_PAGE,) not in looked_at
+            },
+            "aligned": same,
         }
         rows = self._rows(changes, writer, partly=partly)
         n = writer.commit(_leaving_time(rows) if gently else rows, kept)

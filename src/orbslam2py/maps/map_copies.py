@@ -12,12 +12,14 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     BoolArray,
     Cameras,
     Covisibility,
     ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
@@ -36,7 +38,8 @@ class ChangedContents:
     """Possible changes of a map since an earlier copy, to update a file."""
 
     contents: MapContents
-    """All but known keypoints and the points on unchanged pages."""
+    """All but known keypoints, the points on unchanged pages with their patches, the samples of
+    unchanged states of the IMU, and the aligned sightings of unchanged keyframes."""
     keyframe_stamp: int
     """Number of the last change of a keyframe ..."""
     point_stamp: int
@@ -54,7 +57,10 @@ class ChangedContents:
 
 
 def take_contents(
-    slam_map: core.Map, inertial: core.InertialKeyframes | None = None
+    slam_map: core.Map,
+    inertial: core.InertialKeyframes | None = None,
+    *,
+    patches: bool = True,
 ) -> MapContents:
     """Copy a whole map at one moment; the system may be running.
 
@@ -66,8 +72,11 @@ def take_contents(
         The map.
     inertial
         Who has the states of an IMU at its keyframes; None: nobody.
+    patches
+        Copy the patches of points, and the sightings that were aligned to them.
     """
-    return take_changes(slam_map, np.zeros(0, np.int64), None, inertial).contents
+    nothing = np.zeros(0, np.int64)
+    return take_changes(slam_map, nothing, None, inertial, patches=patches).contents
 
 
 def take_changes(
@@ -75,6 +84,8 @@ def take_changes(
     known_keyframes: IntArray,
     before: ChangedContents | None,
     inertial: core.InertialKeyframes | None = None,
+    *,
+    patches: bool = True,
 ) -> ChangedContents:
     """Copy possible changes of a map since an earlier copy, without the counters of tracking.
 
@@ -86,7 +97,7 @@ def take_changes(
         Ids (m,), ascending, of keyframes whose keypoints are left out, because they never change.
     before
         The earlier copy of the same map (`MapContents.map_index`); None if there is none.
-    inertial
+    inertial, patches
         As of `take_contents`.
     """
     since: dict[str, Any] = {}
@@ -96,7 +107,7 @@ def take_changes(
             "point_stamp": before.point_stamp,
             "incomplete_pages": before.incomplete_pages,
         }
-    arrays = core.map_contents(slam_map, known_keyframes, **since)
+    arrays = core.map_contents(slam_map, known_keyframes, with_patches=patches, **since)
     groups: dict[str, dict[str, Any]] = {}
     for name, array in arrays.items():
         group, _, field = name.rpartition(".")
@@ -109,6 +120,8 @@ def take_changes(
         points=Points(**groups["points"]),
         observations=Observations(**groups["observations"]),
         covisibility=Covisibility(**groups["covisibility"]),
+        patches=Patches(**groups["patches"]),
+        aligned=AlignedSightings(**groups["aligned"]),
     )
     epoch, roots = _metric_roots.get(slam_map, (-1, ()))
     if epoch == contents.map_index:  # else it was emptied since, and ids began anew

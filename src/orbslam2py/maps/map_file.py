@@ -6,9 +6,10 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import path_of
+from orbslam2py._arguments import choice_of, path_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.imu_states import check_states, put_states
@@ -140,7 +141,7 @@ class MapFile:
         raise MapFileError(f"{self.source} was changed since it was opened; open it again")
 
 
-def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
+def save_map(saved: SavedMap, path: str | os.PathLike[str], *, patches: bool = True) -> None:
     """Write a map file; it gets its name only after it is complete.
 
     Parameters
@@ -149,6 +150,8 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
         The map, with all that is needed to use it.
     path
         The file, by custom with the suffix ``.orbmap``; an existing map is replaced.
+    patches
+        Write the patches of points, a kilobyte each, and the sightings that were aligned to them.
 
     Raises
     ------
@@ -157,6 +160,8 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
         if it exists and is no map; an existing file is kept.
     """
     contents_of(saved_of(saved).contents)
+    if not choice_of(patches, "patches"):
+        saved = replace(saved, contents=saved.contents.without_patches())
     path = path_of(path, "the map file", MapFileError)
     if not len(saved.contents.keyframes):
         raise MapFileError(

@@ -20,6 +20,7 @@ from orbslam2py.maps.schema import (
     FRAMES_PER_ROW,
     IDS_PER_PAGE,
     IN_METRES,
+    PATCHES_PER_PAGE,
     TABLES,
     UPRIGHT,
     Blob,
@@ -111,6 +112,12 @@ def map_rows(
     states = contents.imu_states
     rows = range(len(states)) if changed_states is None else np.flatnonzero(changed_states)
     yield from _imu_rows(states, rows)
+    patches, aligned = contents.patches, contents.aligned
+    yield from _page_rows("patches", patches, patches.point, PATCHES_PER_PAGE)
+    for keyframe, which in _groups(aligned.keyframe):
+        yield "aligned", (keyframe, *_blobs(TABLES["aligned"], aligned, which))
+    for number, (factor, measured) in enumerate(contents.alignment_noise.tolist()):
+        yield "alignment_noise", (number, factor, int(measured))
 
 
 def keypoint_rows(
@@ -223,8 +230,10 @@ def _imu_rows(states: ImuStates, rows: Iterable[int]) -> Iterator[tuple[str, Row
         )
 
 
-def _page_rows(name: str, group: object, ids: IntArray) -> Iterator[tuple[str, Row]]:
-    for page, which in _groups(ids // IDS_PER_PAGE):
+def _page_rows(
+    name: str, group: object, ids: IntArray, ids_each: int = IDS_PER_PAGE
+) -> Iterator[tuple[str, Row]]:
+    for page, which in _groups(ids // ids_each):
         yield name, (page, *_blobs(TABLES[name], group, which))
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     LENS_SIZE,
     MOUNT_SIZE,
     Cameras,
@@ -25,6 +26,7 @@ from orbslam2py.maps.content_groups import (
     ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
     model_number_of,
@@ -251,7 +253,25 @@ class MapTables:
             covisibility=Covisibility(a=np.repeat(edges.keys[:, 0], edges.counts), **edges.whole()),
             loop_edges=np.array(loops, np.int64).reshape(-1, 2),
             imu_states=self._imu_states(),
+            **self._alignment(),
         )
+
+    def _alignment(self) -> dict[str, Any]:
+        """Patches, and sightings that were aligned to them."""
+        if "patches" not in self._tables:  # files of earlier versions
+            return {}
+        connection, tables = self._connection, self._tables
+        sightings = BlobTable(connection, tables["aligned"])
+        aligned = sightings.whole()
+        aligned["reference"] = aligned["reference"] != 0
+        noise = read_rows(connection, tables["alignment_noise"])
+        return {
+            "patches": Patches(**BlobTable(connection, tables["patches"]).whole()),
+            "aligned": AlignedSightings(
+                keyframe=np.repeat(sightings.keys[:, 0], sightings.counts), **aligned
+            ),
+            "alignment_noise": np.array([row[1:] for row in noise], np.float64).reshape(-1, 2),
+        }
 
     def _imu_states(self) -> ImuStates:
         if "imu_states" not in self._tables:  # files of earlier versions

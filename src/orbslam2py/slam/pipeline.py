@@ -163,6 +163,7 @@ class Pipeline:
             options=asdict(options),
             earlier=setup.loaded,
             inertial=self._imu_states,
+            patches=options.point_patches,
         )
 
     def start(self) -> None:

@@ -96,6 +96,9 @@ class System:
         Functions that receive loops, keyframes, losses and changes of the map.
     keyframe_images : bool
         Store a small grey JPEG of every keyframe in map files.
+    point_patches : bool
+        Store the patches of points, a kilobyte each, and the sightings that were aligned to them,
+        in map files, so that sightings of old points are aligned in a loaded map.
     seed : int
         Seed of all random numbers.
     several_maps : bool
@@ -156,6 +159,7 @@ class System:
         full_adjustment_time_limit: float | None = None,
         callbacks: Callbacks | None = None,
         keyframe_images: bool = False,
+        point_patches: bool = True,
         seed: int = 0,
         check_calibration: bool = True,
         several_maps: bool = True,
@@ -171,6 +175,7 @@ class System:
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
             keyframe_images=keyframe_images,
+            point_patches=point_patches,
             seed=seed,
             check_calibration=check_calibration,
             several_maps=several_maps,

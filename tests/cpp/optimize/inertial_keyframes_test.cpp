@@ -153,8 +153,8 @@ void expect_equal(const InertialRows& a, const InertialRows& b) {
   }
 }
 
-std::vector<BundleProblem::Inertial::Link> links_of(const Chain& chain,
-                                                    const InertialKeyframes& inertial) {
+std::vector<BundleProblem::ImuLink> links_of(const Chain& chain,
+                                             const InertialKeyframes& inertial) {
   std::vector<KeyFrameId> ids;
   GatheredBundle bundle(chain.map);
   chain.map.for_each_keyframe([&](const KeyFrame& k) {
@@ -202,7 +202,9 @@ TEST(StoredStates, GiveTheSamePreintegrationsAlsoWhereOneIsCulled) {
     InertialKeyframes restored(kT_cb, kNoise);
     resume(take(chain, chain.inertial), restored);
     for (const bool culled : {false, true}) {
-      if (culled) ASSERT_TRUE(chain.map.erase_keyframe(id(3)));
+      if (culled) {
+        ASSERT_TRUE(chain.map.erase_keyframe(id(3)));
+      }
       const auto before = links_of(chain, chain.inertial), after = links_of(chain, restored);
       ASSERT_EQ(after.size(), culled ? 4U : 5U);
       for (std::size_t i = 0; i < after.size(); ++i) {

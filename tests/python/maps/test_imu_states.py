@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,7 +70,12 @@ def test_a_restored_map_has_them(saved: SavedMap, tmp_path: Path, from_file: boo
 
 def test_a_map_without_them_has_the_hash_of_before() -> None:
     bare = made_up_map(4)
-    assert with_states(bare, but=(0, 1, 2, 3)).content_hash() == bare.content_hash()
+    digest = hashlib.sha256(f"{bare.next_keyframe} {bare.next_point}".encode())
+    for name, array in bare.arrays():
+        if name != "keyframes.words" and not name.startswith("imu_states."):
+            digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
+            digest.update(np.ascontiguousarray(array).data)
+    assert bare.content_hash() == digest.hexdigest()
     assert with_states(bare).content_hash() != bare.content_hash()
 
 
@@ -99,7 +105,7 @@ def test_a_removed_keyframe_leaves_its_samples_to_the_next(saved: SavedMap) -> N
     assert before.ids.tolist() == [0, 2, 3, 4, 5, 6, 7]
     part = keep_keyframes(contents, np.arange(8) != 6).imu_states
     assert part.ids.tolist() == [0, 2, 3, 4, 5, 7]
-    assert np.diff(part.offsets).tolist() == [0, 11, 11, 0, 11, 2 * SAMPLES - 1]
+    assert np.diff(part.offsets).tolist() == [0, 11, 11, 11, 0, 2 * SAMPLES - 1]
     times = part.samples[part.offsets[5] :, 0]
     assert (np.diff(times) > 0).all()
     np.testing.assert_array_equal(
@@ -113,7 +119,7 @@ def test_a_removed_keyframe_leaves_its_samples_to_the_next(saved: SavedMap) -> N
 def test_the_first_one_of_a_part_begins_anew(saved: SavedMap) -> None:
     part = keep_keyframes(saved.contents, np.arange(8) > 1)
     assert part.imu_states.ids.tolist() == [0, 3, 4, 5, 6, 7], "the root has number 0"
-    assert np.diff(part.imu_states.offsets).tolist() == [0, 11, 0, 11, 11, 11]
+    assert np.diff(part.imu_states.offsets).tolist() == [0, 11, 11, 0, 11, 11]
     restore_contents(part)
     np.testing.assert_array_equal(
         part.imu_states.velocity, saved.contents.imu_states.velocity[1:]
@@ -157,11 +163,11 @@ def test_only_changed_states_are_written_again(saved: SavedMap, tmp_path: Path) 
     writer = MapWriter(path)
     first = autosave.changes(writer, None)
     autosave.update(writer, first, partly=False)
-    keeper.set(5, np.array([1.0, 2.0, 3.0]), np.arange(6.0))
+    keeper.set(6, np.array([1.0, 2.0, 3.0]), np.arange(6.0))
     second = autosave.changes(writer, first)
     changed = second.contents.imu_states.ids[second.changed_states]
-    assert changed.tolist() == [5]
-    assert len(second.contents.imu_states.samples) == 0, "it is of another run now"
+    assert changed.tolist() == [6]
+    assert len(second.contents.imu_states.samples) == SAMPLES, "those before it"
     autosave.update(writer, second, partly=True)
     assert slam_map.erase_keyframe(3)
     third = autosave.changes(writer, second)

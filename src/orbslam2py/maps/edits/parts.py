@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     ArrayGroup,
     BoolArray,
     Cameras,
@@ -23,6 +24,7 @@ from orbslam2py.maps.content_groups import (
     ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
@@ -281,7 +283,19 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
             for root in part.upright_roots
         ),
         imu_states=replace(states, offsets=samples_end),
+        patches=together(
+            Patches, lambda part: part.patches, point=point, keyframe=keyframe, camera=camera
+        ),
+        aligned=together(
+            AlignedSightings, lambda part: part.aligned, point=point, keyframe=keyframe
+        ),
+        alignment_noise=_noise_of_all(parts),
     )
+
+
+def _noise_of_all(parts: Sequence[MapContents]) -> FloatArray:
+    """That of the map which measured it most often: a system has one for all its maps."""
+    return max((part.alignment_noise for part in parts), key=lambda noise: noise[:, 1].sum())
 
 
 def _complete(keyframes: Keyframes, all_of_them: Sequence[Keyframes]) -> Keyframes:
