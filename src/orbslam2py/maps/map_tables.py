@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
-    AlignedSightings,
     LENS_SIZE,
     MOUNT_SIZE,
+    AlignedSightings,
     Cameras,
     Covisibility,
     ImuStates,

@@ -72,7 +72,9 @@ def test_a_map_without_them_has_the_hash_of_before() -> None:
     bare = made_up_map(4)
     digest = hashlib.sha256(f"{bare.next_keyframe} {bare.next_point}".encode())
     for name, array in bare.arrays():
-        if name != "keyframes.words" and not name.startswith("imu_states."):
+        if name != "keyframes.words" and not name.startswith(
+            ("imu_states.", "patches.", "aligned.", "alignment_noise")
+        ):
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)
     assert bare.content_hash() == digest.hexdigest()
@@ -105,12 +107,10 @@ def test_a_removed_keyframe_leaves_its_samples_to_the_next(saved: SavedMap) -> N
     assert before.ids.tolist() == [0, 2, 3, 4, 5, 6, 7]
     part = keep_keyframes(contents, np.arange(8) != 6).imu_states
     assert part.ids.tolist() == [0, 2, 3, 4, 5, 7]
-    assert np.diff(part.offsets).tolist() == [0, 11, 11, 11, 0, 2 * SAMPLES - 1]
+    assert np.diff(part.offsets).tolist() == [0, 11, 11, 0, 11, 2 * SAMPLES - 1]
     times = part.samples[part.offsets[5] :, 0]
     assert (np.diff(times) > 0).all()
-    np.testing.assert_array_equal(
-        part.velocity, before.velocity[[0, 1, 2, 3, 4, 6]]
-    )
+    np.testing.assert_array_equal(part.velocity, before.velocity[[0, 1, 2, 3, 4, 6]])
     # Where nothing joined one of them to the one before, nothing joins the next.
     part = keep_keyframes(contents, np.arange(8) != 4).imu_states
     assert np.diff(part.offsets).tolist() == [0, 11, 11, 0, 11, 11]
@@ -119,11 +119,9 @@ def test_a_removed_keyframe_leaves_its_samples_to_the_next(saved: SavedMap) -> N
 def test_the_first_one_of_a_part_begins_anew(saved: SavedMap) -> None:
     part = keep_keyframes(saved.contents, np.arange(8) > 1)
     assert part.imu_states.ids.tolist() == [0, 3, 4, 5, 6, 7], "the root has number 0"
-    assert np.diff(part.imu_states.offsets).tolist() == [0, 11, 11, 0, 11, 11]
+    assert np.diff(part.imu_states.offsets).tolist() == [0, 11, 0, 11, 11, 11]
     restore_contents(part)
-    np.testing.assert_array_equal(
-        part.imu_states.velocity, saved.contents.imu_states.velocity[1:]
-    )
+    np.testing.assert_array_equal(part.imu_states.velocity, saved.contents.imu_states.velocity[1:])
 
 
 def test_maps_in_one_file_and_taken_out_again(saved: SavedMap) -> None:

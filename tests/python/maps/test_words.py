@@ -95,7 +95,8 @@ def test_a_map_of_an_earlier_version_is_used_like_any(tmp_path: Path, version: i
     saved = load_map(old)
     assert bool(len(saved.contents.keyframes.words)) == (version > 1)
     assert saved.contents.cameras.distortion.tolist() == [[0.0] * 8]
-    assert small_map().contents.first_difference(saved.contents) is None
+    assert small_map().contents.without_patches().first_difference(saved.contents) is None
+    save_map(small_map(), new, patches=False)
     assert np.array_equal(_poses_in(old), _poses_in(new))
     save_map(saved, tmp_path / "again.orbmap")
     assert np.array_equal(_poses_in(tmp_path / "again.orbmap"), _poses_in(new))

@@ -13,8 +13,10 @@ from orbslam2py.maps import ImuStates, MapContents
 SAMPLES = 11
 
 
-def with_states(contents: MapContents, *, but: tuple[int, ...] = (1,), seed: int = 5) -> MapContents:
-    """A map with states at all keyframes but some; nothing joins that of row 4 to the one before.
+def with_states(
+    contents: MapContents, *, but: tuple[int, ...] = (1,), seed: int = 5
+) -> MapContents:
+    """A map with states at all keyframes but some; nothing joins that of row 4 to that of row 3.
 
     Parameters
     ----------

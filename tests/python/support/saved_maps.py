@@ -36,8 +36,8 @@ def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
 def written_as_version(version: int, folder: Path) -> Path:
     """The small map as an earlier version of the format had it.
 
-    Version 5 had no states of an IMU, version 4 no rigs, version 3 no fisheye lenses, version 2 no rational ones; version 1 had
-    no words, and a short hash of the vocabulary.
+    Version 5 had neither states of an IMU nor patches, version 4 no rigs, version 3 no fisheye
+    lenses, version 2 no rational ones; version 1 had no words, and a short hash of the vocabulary.
     """
     path = folder / f"version_{version}.orbmap"
     sums: dict[str, list[int]] = {name: [] for name in tables_of(version)}
