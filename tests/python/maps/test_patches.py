@@ -128,9 +128,7 @@ def test_they_can_be_left_out(saved: SavedMap, tmp_path: Path) -> None:
 
 def test_a_system_leaves_them_out_of_its_files(tmp_path: Path) -> None:
     path = tmp_path / "a.orbmap"
-    with small_sequences.new_system(
-        Sensor.RGBD, deterministic=True, point_patches=False
-    ) as slam:
+    with small_sequences.new_system(Sensor.RGBD, deterministic=True, point_patches=False) as slam:
         slam.autosave(path, every=1000)
         small_sequences.play(slam, 12)
         slam.save_map(path)
@@ -220,13 +218,13 @@ def test_patches_of_a_camera_that_is_gone_are_left_out(contents: MapContents) ->
         ),
         ("UPDATE aligned SET variances = x'' WHERE keyframe = 0", "variances of aligned 0"),
         (
-            "UPDATE patches SET keyframes = zeroblob(length(keyframes) - 1) || x'7F'"
+            "UPDATE patches SET keyframes = CAST(zeroblob(length(keyframes) - 1) || x'7F' AS BLOB)"
             " WHERE page = 2",
             "the patch of point .* is of keyframe",
         ),
         (
-            "UPDATE patches SET cameras = zeroblob(length(cameras) - 8) || x'0300000000000000'"
-            " WHERE page = 2",
+            "UPDATE patches SET cameras = "
+            "CAST(zeroblob(length(cameras) - 8) || x'0300000000000000' AS BLOB) WHERE page = 2",
             "the patch of point .* has the camera 3",
         ),
         (
@@ -238,8 +236,8 @@ def test_patches_of_a_camera_that_is_gone_are_left_out(contents: MapContents) ->
             "aligned keypoint 0 of keyframe 0 has no such keyframe, or is out of order",
         ),
         (
-            "UPDATE aligned SET variances = zeroblob(length(variances) - 4) || x'0000C07F'"
-            " WHERE keyframe = 0",
+            "UPDATE aligned SET variances = "
+            "CAST(zeroblob(length(variances) - 4) || x'0000C07F' AS BLOB) WHERE keyframe = 0",
             "the aligned keypoint .* of keyframe 0 has a number out of range",
         ),
         ("UPDATE alignment_noise SET factor = 0.0", "noise of aligned sightings"),

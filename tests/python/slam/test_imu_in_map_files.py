@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +32,7 @@ def sequence() -> SyntheticSequence:
 
 def play(slam: System, begin: int, end: int) -> None:
     with_imu = slam.pipeline.inertial.settings is not None
-    for index in range(begin, end):
-        frame = sequence()[index]
+    for frame in islice(sequence(), begin, end):
         slam.track(frame.images, frame.timestamp, imu=frame.imu if with_imu else None)
 
 
@@ -41,9 +41,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> SavedMap:
     """The map of the first part, as it comes back from a file that grew."""
     path = tmp_path_factory.mktemp("maps") / "first.orbmap"
     settings = sequence().default_settings()
-    with System(
-        settings, "stereo", imu=sequence().imu_settings(), deterministic=True
-    ) as slam:
+    with System(settings, "stereo", imu=sequence().imu_settings(), deterministic=True) as slam:
         slam.autosave(path, every=1000)
         for end in range(30, FIRST_PART + 1, 20):
             play(slam, end - 20 if end > 30 else 0, end)
