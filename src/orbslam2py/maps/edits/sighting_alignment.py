@@ -132,7 +132,8 @@ def align_sightings(
         )
     if not is_whole(rounds) or rounds < 1:
         raise MapFileError(f"rounds is {shown(rounds)}; give a whole number of at least 1")
-    slam_map = restore_contents(contents)
+    # Corners, as long as this has not aligned them: those that are aligned belong to other patches.
+    slam_map = restore_contents(contents.without_patches())
     alignment = core.SightingAlignment(slam_map)
     images = _Images(contents, alignment.keyframes, sequence, rounds, progress)
     error_before = alignment.median_error
@@ -157,6 +158,9 @@ def align_sightings(
         map_index=contents.map_index,
         keyframes=keyframes,
         imu_states=contents.imu_states,
+        patches=contents.patches,
+        aligned=contents.aligned,
+        alignment_noise=contents.alignment_noise,
     )
     return refined, record
 
