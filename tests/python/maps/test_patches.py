@@ -137,6 +137,27 @@ def test_a_system_leaves_them_out_of_its_files(tmp_path: Path) -> None:
     assert len(load_map(path).contents.aligned) == 0
 
 
+def test_a_file_that_grows_has_the_present_ones(tmp_path: Path) -> None:
+    """Only what has changed was looked at."""
+    path = tmp_path / "a.orbmap"
+    with small_sequences.new_system(Sensor.RGBD, deterministic=True) as slam:
+        slam.autosave(path, every=1000)
+        autosave = slam.pipeline.keeper._autosave
+        assert autosave is not None
+        for first in range(0, 40, 8):
+            small_sequences.play(slam, 8, first=first)
+            autosave.save_now(everything=False)
+        there = load_map(path).contents
+        now = slam.map_contents()
+    for (name, one), (_, other) in zip(there.patches.arrays(), now.patches.arrays(), strict=True):
+        assert one.tobytes() == other.tobytes(), name
+    # Entries whose observation has gone may still be in it; they do not count.
+    counted = take_contents(restore_contents(there)).aligned
+    for (name, one), (_, other) in zip(counted.arrays(), now.aligned.arrays(), strict=True):
+        assert one.tobytes() == other.tobytes(), name
+    np.testing.assert_array_equal(there.alignment_noise, now.alignment_noise)
+
+
 @pytest.mark.parametrize("patches", [True, False])
 def test_old_points_are_aligned_in_a_loaded_map(tmp_path: Path, patches: bool) -> None:
     path = written(tmp_path)
