@@ -2507,6 +2507,45 @@ class NewPointOptions:
     @n_neighbours.setter
     def n_neighbours(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
         ...
+class InertialKeyframes:
+    """
+    Samples of an IMU, and its velocities and biases at keyframes.
+    """
+    def __init__(self, T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"]) -> None:
+        """
+        As of InertialFilter.
+        """
+    def __len__(self) -> int:
+        ...
+    def add_samples(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Samples (n, 7) after those before, which they may overlap by one.
+        """
+    def clear(self) -> None:
+        """
+        Forget everything.
+        """
+    def find(self, keyframe: int) -> typing.Any:
+        """
+        Velocity (3,) and bias (6,) of a keyframe, as of `set`; or None.
+        """
+    def put(self, ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], scale: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], offsets: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
+        """
+        Replace everything by the states of an earlier run, as `take` gives them. Samples that come later join none of them. Raises ValueError for lengths that do not fit.
+        """
+    def set(self, keyframe: int, velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]) -> None:
+        """
+        Velocity of the IMU (3,) [m/s] in the axes of the camera of a keyframe that was just inserted, and its bias (6,).
+        """
+    def take(self, keyframes: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], timestamps: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], known: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] = ...) -> dict:
+        """
+        The states of these keyframes (ascending ids, with their seconds) and the samples between them, as arrays by name: see orbslam2py.maps.ImuStates. Beside these `versions` (m, 3), equal for equal rows, and `changed` (m,): the version is not in `known` (n, 3); other rows come without their samples.
+        """
+    @property
+    def newest_bias(self) -> typing.Any:
+        """
+        Bias (6,) of the keyframe with the highest id; None without any.
+        """
 class PoseEstimate:
     """
     Result of optimize_pose.
@@ -2690,32 +2729,6 @@ class BundleSummary:
     def timed_out(self) -> bool:
         """
         A time limit ended it; the result so far is used.
-        """
-class InertialKeyframes:
-    """
-    Samples of an IMU, and its velocities and biases at keyframes.
-    """
-    def __init__(self, T_cb: Pose, noise: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"]) -> None:
-        """
-        As of InertialFilter.
-        """
-    def __len__(self) -> int:
-        ...
-    def add_samples(self, samples: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> None:
-        """
-        Samples (n, 7) after those before, which they may overlap by one.
-        """
-    def clear(self) -> None:
-        """
-        Forget everything.
-        """
-    def find(self, keyframe: int) -> typing.Any:
-        """
-        Velocity (3,) and bias (6,) of a keyframe, as of `set`; or None.
-        """
-    def set(self, keyframe: int, velocity: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], bias: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]) -> None:
-        """
-        Velocity of the IMU (3,) [m/s] in the axes of the camera of a keyframe that was just inserted, and its bias (6,).
         """
 class LocalBundleResult:
     """
@@ -3925,12 +3938,14 @@ def make_two_rooms(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64,
     """
     Two rooms that look alike, joined by a passage of the given length [m].
     """
-def map_contents(map: Map, known: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] = ..., keyframe_stamp: typing.SupportsInt | typing.SupportsIndex = 0, point_stamp: typing.SupportsInt | typing.SupportsIndex = 0, incomplete_pages: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] = ...) -> dict:
+def map_contents(map: Map, known: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] = ..., keyframe_stamp: typing.SupportsInt | typing.SupportsIndex = 0, point_stamp: typing.SupportsInt | typing.SupportsIndex = 0, incomplete_pages: typing.Annotated[numpy.typing.ArrayLike, numpy.int64] = ..., with_patches: bool = True) -> dict:
     """
     The complete contents of a map at one moment, as arrays by name: see
     orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64
     ascending), which never change, are left out. With the stamps and incomplete pages
-    of an earlier call, points come only of pages that may have changed since.
+    of an earlier call, points and their patches come only of pages that may have
+    changed since, and aligned sightings of keyframes that may have. Without patches
+    there are no aligned sightings either.
     """
 def match_keyframe_by_descriptors(map: Map, keyframe: int, frame: TrackedFrame, ratio: typing.SupportsFloat | typing.SupportsIndex) -> int:
     """

@@ -25,6 +25,7 @@ void bind_places(pybind11::module_& module);
 void bind_map_contents(pybind11::module_& module);
 void bind_geometry(pybind11::module_& module);
 void bind_matching(pybind11::module_& module);
+void bind_inertial_keyframes(pybind11::module_& module);
 void bind_optimize(pybind11::module_& module);
 void bind_alignment(pybind11::module_& module);
 void bind_loops(pybind11::module_& module);

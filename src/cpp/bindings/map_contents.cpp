@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <utility>
@@ -245,10 +246,68 @@ void put_the_rest(py::dict& arrays, MapContents&& contents) {
   arrays["loop_edges"] = owned<std::int64_t>(std::move(contents.loop_edges), {2});
 }
 
+// Numbers in a patch.
+constexpr py::ssize_t kPatchValues = ReferencePatch::kSize * ReferencePatch::kSize;
+
+void put_patches(py::dict& arrays, PatchRows&& rows) {
+  const auto n = static_cast<py::ssize_t>(rows.point.size());
+  using Shape = std::vector<py::ssize_t>;
+  py::array_t<std::int64_t> keyframe(n);
+  py::array_t<std::uint8_t> level(n);
+  py::array_t<float> pixel(Shape{n, 2}), fraction(Shape{n, 2});
+  py::array_t<std::uint16_t> values(Shape{n, kPatchValues});
+  std::int64_t* const keyframes = keyframe.mutable_data();
+  std::uint8_t* const levels = level.mutable_data();
+  float *const pixels = pixel.mutable_data(), *const fractions = fraction.mutable_data();
+  std::uint16_t* const numbers = values.mutable_data();
+  {
+    const py::gil_scoped_release release;
+    for (std::size_t i = 0; i < rows.patches.size(); ++i) {
+      const PointPatch& patch = *rows.patches[i];
+      keyframes[i] = patch.keyframe.value;
+      levels[i] = static_cast<std::uint8_t>(patch.level);
+      std::copy_n(patch.pixel.data(), 2, pixels + 2 * i);
+      std::copy_n(patch.patch.fraction.data(), 2, fractions + 2 * i);
+      std::memcpy(numbers + kPatchValues * static_cast<py::ssize_t>(i), &patch.patch.values,
+                  sizeof(patch.patch.values));
+    }
+  }
+  arrays["patches.point"] = owned<std::int64_t>(std::move(rows.point));
+  arrays["patches.keyframe"] = keyframe;
+  arrays["patches.camera"] = owned<std::int64_t>(std::move(rows.camera));
+  arrays["patches.level"] = level;
+  arrays["patches.pixel"] = pixel;
+  arrays["patches.fraction"] = fraction;
+  arrays["patches.values"] = values;
+}
+
+void put_aligned(py::dict& arrays, AlignedRows&& rows, std::vector<NoiseRow>&& noise) {
+  const auto& sightings = rows.sightings;
+  const auto put = [&](const char* name, auto value_of) {
+    using Item = decltype(value_of(sightings.front()));
+    py::array_t<Item> array(static_cast<py::ssize_t>(sightings.size()));
+    std::transform(sightings.begin(), sightings.end(), array.mutable_data(), value_of);
+    arrays[name] = array;
+  };
+  using A = AlignedSighting;
+  std::vector<std::array<float, 2>> positions;
+  for (const A& a : sightings) positions.push_back({a.u, a.v});
+  arrays["aligned.keyframe"] = owned<std::int64_t>(std::move(rows.keyframe));
+  arrays["aligned.keypoint"] = owned<std::int32_t>(std::move(rows.keypoint));
+  put("aligned.point", [](const A& a) { return a.point.value; });
+  arrays["aligned.position"] = owned<float>(std::move(positions), {2});
+  put("aligned.right_u", [](const A& a) { return a.right_u; });
+  put("aligned.variance", [](const A& a) { return a.variance; });
+  put("aligned.right_variance", [](const A& a) { return a.right_variance; });
+  put("aligned.reference", [](const A& a) { return a.reference; });
+  arrays["alignment_noise"] = owned<double>(std::move(noise), {2});
+}
+
 using ContiguousIds = py::array_t<std::int64_t, py::array::c_style>;
 
 py::dict map_contents(const Map& map, const ContiguousIds& known, std::uint64_t keyframe_stamp,
-                      std::uint64_t point_stamp, const ContiguousIds& incomplete_pages) {
+                      std::uint64_t point_stamp, const ContiguousIds& incomplete_pages,
+                      bool with_patches) {
   MapContents contents;
   const ContentsKnown before{
       keyframe_stamp,
@@ -258,7 +317,7 @@ py::dict map_contents(const Map& map, const ContiguousIds& known, std::uint64_t 
   {
     const std::vector<std::int64_t> ids(known.data(), known.data() + known.size());
     const py::gil_scoped_release release;
-    contents = take_contents(map, before);
+    contents = take_contents(map, before, with_patches);
     for (const KeyFrameId id : contents.keyframes.ids) {
       is_known.push_back(std::binary_search(ids.begin(), ids.end(), id.value));
     }
@@ -275,6 +334,8 @@ py::dict map_contents(const Map& map, const ContiguousIds& known, std::uint64_t 
   put_cameras(arrays, contents.cameras);
   put_keyframes(arrays, std::move(contents.keyframes));
   put_keypoints(arrays, contents.frames, is_known);
+  put_patches(arrays, std::move(contents.patches));
+  put_aligned(arrays, std::move(contents.aligned), std::move(contents.noise));
   put_the_rest(arrays, std::move(contents));
   return arrays;
 }
@@ -430,6 +491,29 @@ void read_the_rest(Arrays& arrays, StoredMap& stored) {
   stored.loop_edges = arrays.column<std::array<std::int64_t, 2>, std::int64_t, 2>("loop_edges", l);
 }
 
+void read_patches(Arrays& arrays, StoredMap& stored) {
+  py::ssize_t q = -1, a = -1, n = -1;
+  auto& patches = stored.patches;
+  using Two = std::array<float, 2>;
+  patches.point = arrays.column<std::int64_t>("patches.point", q);
+  patches.keyframe = arrays.column<std::int64_t>("patches.keyframe", q);
+  patches.camera = arrays.column<std::int64_t>("patches.camera", q);
+  patches.level = arrays.column<std::uint8_t>("patches.level", q);
+  patches.pixel = arrays.column<Two, float, 2>("patches.pixel", q);
+  patches.fraction = arrays.column<Two, float, 2>("patches.fraction", q);
+  patches.values = arrays.items<std::uint16_t, kPatchValues>("patches.values", q);
+  auto& aligned = stored.aligned;
+  aligned.keyframe = arrays.column<std::int64_t>("aligned.keyframe", a);
+  aligned.keypoint = arrays.column<std::int32_t>("aligned.keypoint", a);
+  aligned.point = arrays.column<std::int64_t>("aligned.point", a);
+  aligned.position = arrays.column<Two, float, 2>("aligned.position", a);
+  aligned.right_u = arrays.column<float>("aligned.right_u", a);
+  aligned.variance = arrays.column<float>("aligned.variance", a);
+  aligned.right_variance = arrays.column<float>("aligned.right_variance", a);
+  aligned.reference = arrays.flags("aligned.reference", a);
+  stored.noise = arrays.column<NoiseRow, double, 2>("alignment_noise", n);
+}
+
 /// All but the keypoints.
 StoredMap read_stored(Arrays& arrays) {
   StoredMap stored;
@@ -438,6 +522,7 @@ StoredMap read_stored(Arrays& arrays) {
   read_cameras(arrays, stored);
   read_keyframes(arrays, stored);
   read_the_rest(arrays, stored);
+  read_patches(arrays, stored);
   return stored;
 }
 
@@ -541,10 +626,13 @@ void bind_map_contents(py::module_& module) {
   module.def("map_contents", &map_contents, "map"_a,
              "known"_a = py::array_t<std::int64_t>(py::ssize_t{0}), "keyframe_stamp"_a = 0,
              "point_stamp"_a = 0, "incomplete_pages"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
+             "with_patches"_a = true,
              "The complete contents of a map at one moment, as arrays by name: see\n"
              "orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64\n"
              "ascending), which never change, are left out. With the stamps and incomplete pages\n"
-             "of an earlier call, points come only of pages that may have changed since.");
+             "of an earlier call, points and their patches come only of pages that may have\n"
+             "changed since, and aligned sightings of keyframes that may have. Without patches\n"
+             "there are no aligned sightings either.");
   module.def("check_map_contents", &check, "contents"_a,
              "Raises MapFileError, naming the thing, unless a map can be made of them.");
   py::class_<MapRestorer>(

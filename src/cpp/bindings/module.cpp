@@ -22,6 +22,7 @@ PYBIND11_MODULE(_core, module) {
   bind_map_contents(module);
   bind_geometry(module);
   bind_matching(module);
+  bind_inertial_keyframes(module);
   bind_optimize(module);
   bind_alignment(module);
   bind_loops(module);

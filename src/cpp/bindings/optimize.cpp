@@ -286,48 +286,6 @@ void bind_bundle(py::module_& module) {
       "shapes or indices.");
 }
 
-void bind_inertial_keyframes(py::module_& module) {
-  using K = InertialKeyframes;
-  py::class_<K>(module, "InertialKeyframes",
-                "Samples of an IMU, and its velocities and biases at keyframes.")
-      .def(py::init([](const Pose& T_cb, const Eigen::Vector4d& noise) {
-             return std::make_unique<K>(T_cb, ImuNoise{noise(0), noise(1), noise(2), noise(3)});
-           }),
-           "T_cb"_a, "noise"_a, "As of InertialFilter.")
-      .def("__len__", &K::size)
-      .def(
-          "add_samples",
-          [](K& self, const Input<double>& array) {
-            std::vector<ImuSample> samples(rows_of(array, 7, "samples"));
-            for (std::size_t i = 0; i < samples.size(); ++i) {
-              const double* row = array.data() + 7 * i;
-              samples[i] = {row[0], {row[1], row[2], row[3]}, {row[4], row[5], row[6]}};
-            }
-            self.add_samples(samples);
-          },
-          "samples"_a, "Samples (n, 7) after those before, which they may overlap by one.")
-      .def(
-          "set",
-          [](K& self, KeyFrameId keyframe, const Eigen::Vector3d& velocity, const Vector6d& bias) {
-            self.set(keyframe, velocity, {bias.head<3>(), bias.tail<3>()});
-          },
-          "keyframe"_a, "velocity"_a, "bias"_a,
-          "Velocity of the IMU (3,) [m/s] in the axes of the camera of a keyframe that was just "
-          "inserted, and its bias (6,).")
-      .def(
-          "find",
-          [](const K& self, KeyFrameId keyframe) -> py::object {
-            Eigen::Vector3d velocity;
-            ImuBias bias;
-            if (!self.find(keyframe, velocity, bias)) return py::none();
-            Vector6d both;
-            both << bias.gyro, bias.accel;
-            return py::make_tuple(velocity, both);
-          },
-          "keyframe"_a, "Velocity (3,) and bias (6,) of a keyframe, as of `set`; or None.")
-      .def("clear", &K::clear, "Forget everything.");
-}
-
 void bind_culling(py::module_& module) {
   module.def(
       "cull_keyframes",
@@ -347,7 +305,6 @@ void bind_culling(py::module_& module) {
 }
 
 void bind_local_bundle(py::module_& module) {
-  bind_inertial_keyframes(module);
   bind_culling(module);
   py::class_<LocalBundleResult>(module, "LocalBundleResult", "What local_bundle_adjustment did.")
       .def_readonly("n_local_keyframes", &LocalBundleResult::n_local_keyframes,

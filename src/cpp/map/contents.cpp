@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "map/contents_access.hpp"
 
@@ -109,6 +110,15 @@ void reserve(PointRows& rows, ObservationRows& observations, std::size_t n) {
   observations.keypoint.reserve(4 * n);
 }
 
+/// A patch is of use with the pose of its keyframe only.
+void copy_patch(const Map& map, const MapPoint& point, PatchRows& rows) {
+  if (!point.patch) return;
+  const KeyFrameId keyframe = point.patch->keyframe;
+  if (!is_published(map, keyframe) && !MapContentsAccess::is_archived(map, keyframe)) return;
+  rows.point.push_back(point.id);
+  rows.patches.push_back(point.patch);
+}
+
 /// Records the point. Returns whether all its observations are part of the contents.
 bool copy_point(const Map& map, const MapPoint& point, MapContents& contents) {
   PointRows& rows = contents.points;
@@ -142,7 +152,8 @@ bool copy_point(const Map& map, const MapPoint& point, MapContents& contents) {
   return complete;
 }
 
-void copy_points(const Map& map, const ContentsKnown& known, MapContents& contents) {
+void copy_points(const Map& map, const ContentsKnown& known, bool with_patches,
+                 MapContents& contents) {
   const auto& table = map.point_table();
   if (known.point_stamp == 0) reserve(contents.points, contents.observations, map.n_points());
   contents.point_stamp = table.stamp();
@@ -154,11 +165,62 @@ void copy_points(const Map& map, const ContentsKnown& known, MapContents& conten
     }
     bool complete = true;
     table.for_each_change(page, 0, [&](MapPointId, const MapPoint* point) {
-      if (point) complete &= copy_point(map, *point, contents);
+      if (!point) return;
+      const std::size_t before = contents.points.ids.size();
+      complete &= copy_point(map, *point, contents);
+      const bool is_part = contents.points.ids.size() > before;
+      if (with_patches && is_part) copy_patch(map, *point, contents.patches);
     });
     contents.pages.push_back(number);
     if (!complete) contents.incomplete_pages.push_back(number);
   }
+}
+
+void copy_aligned(const Map& map, std::uint64_t since, AlignedRows& rows) {
+  const auto& table = map.keyframe_table();
+  for (std::size_t page = 0; page < table.n_pages(); ++page) {
+    table.for_each_change(page, since, [&](KeyFrameId id, const KeyFrame* keyframe) {
+      if (!keyframe || !keyframe->published) return;
+      for (std::size_t i = 0; i < keyframe->aligned.size(); ++i) {
+        const AlignedSighting& sighting = keyframe->aligned[i];
+        if (!sighting.point.valid() || keyframe->map_points[i] != sighting.point) continue;
+        const MapPoint* point = map.find(sighting.point);
+        if (!point || !point->patch) continue;
+        rows.keyframe.push_back(id);
+        rows.keypoint.push_back(static_cast<std::int32_t>(i));
+        rows.sightings.push_back(sighting);
+      }
+    });
+  }
+}
+
+NoiseRow row_of(const NoiseFactor& noise) {
+  return {noise.value(), static_cast<double>(noise.n_measured())};
+}
+
+/// Leaves out patches whose camera no keyframe has any more.
+void list_cameras_of_patches(MapContents& contents) {
+  PatchRows kept;
+  const PointPatch* before = nullptr;
+  std::int64_t row = -1;
+  for (std::size_t i = 0; i < contents.patches.point.size(); ++i) {
+    auto& patch = contents.patches.patches[i];
+    if (!before || before->camera != patch->camera || before->scales != patch->scales) {
+      Frame seen;
+      seen.camera = patch->camera;
+      seen.scales = patch->scales;
+      const auto found =
+          std::find_if(contents.cameras.begin(), contents.cameras.end(),
+                       [&](const CameraContents& camera) { return same(camera, seen); });
+      row = found == contents.cameras.end() ? -1 : found - contents.cameras.begin();
+    }
+    before = patch.get();
+    if (row < 0) continue;
+    kept.point.push_back(contents.patches.point[i]);
+    kept.camera.push_back(row);
+    kept.patches.push_back(patch);
+  }
+  contents.patches = std::move(kept);
 }
 
 void note_changed_keyframes(const Map& map, std::uint64_t since, MapContents& contents) {
@@ -213,7 +275,7 @@ ArchivedPose MapContentsAccess::relative_to_root(const Map& map, KeyFrameId id) 
   return {id, root_id, pose.T_cw * root.T_cw.inverse(), pose.scale, root.scale};
 }
 
-MapContents take_contents(const Map& map, const ContentsKnown& known) {
+MapContents take_contents(const Map& map, const ContentsKnown& known, bool with_patches) {
   MapContents contents;
   {
     const auto lock = map.read_lock();
@@ -222,10 +284,16 @@ MapContents take_contents(const Map& map, const ContentsKnown& known) {
     contents.next_point = MapContentsAccess::next_point(map);
     copy_keyframes(map, contents);
     note_changed_keyframes(map, known.keyframe_stamp, contents);
-    copy_points(map, known, contents);
+    copy_points(map, known, with_patches, contents);
+    if (with_patches) copy_aligned(map, known.keyframe_stamp, contents.aligned);
+    // Until something was measured or assumed, these are what a new map has.
+    const bool any = map.noise().position.value() < 1 || map.noise().position.n_measured() > 0;
+    if (with_patches && any)
+      contents.noise = {row_of(map.noise().position), row_of(map.noise().right)};
     copy_removed(map, contents);
   }
   list_cameras(contents);
+  list_cameras_of_patches(contents);
   return contents;
 }
 

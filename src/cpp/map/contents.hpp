@@ -60,6 +60,23 @@ struct EdgeRows {
   std::vector<std::int32_t> weight;
 };
 
+/// The reference sightings of points, whose camera is known by its row.
+struct PatchRows {
+  std::vector<MapPointId> point;     ///< ascending
+  std::vector<std::int64_t> camera;  ///< rows of MapContents::cameras
+  std::vector<std::shared_ptr<const PointPatch>> patches;
+};
+
+/// Sightings that count, or that alignment failed at, of the keyframes that may have changed.
+struct AlignedRows {
+  std::vector<KeyFrameId> keyframe;  ///< ascending, and then by keypoint
+  std::vector<std::int32_t> keypoint;
+  std::vector<AlignedSighting> sightings;
+};
+
+/// NoiseFactor: its value and how often it was measured.
+using NoiseRow = std::array<double, 2>;
+
 /// The complete contents of a map at one moment, ordered by id. Keyframes that local mapping has
 /// not processed yet are left out, and so are points that only they observe. See
 /// docs/reference/map_file.md.
@@ -81,6 +98,9 @@ struct MapContents {
   ObservationRows observations;
   EdgeRows covisibility;
   std::vector<std::array<KeyFrameId, 2>> loop_edges;
+  PatchRows patches;
+  AlignedRows aligned;
+  std::vector<NoiseRow> noise;  ///< of positions and of right columns; empty: nothing is aligned
 };
 
 /// The state of an earlier copy of the same map, by its stamps.
@@ -90,8 +110,10 @@ struct ContentsKnown {
 };
 
 /// Copies the map. Of the points only those on pages with a change since `known`, or incomplete
-/// then. Takes the read lock; the frames' keypoints are not copied under it.
-MapContents take_contents(const Map& map, const ContentsKnown& known = {});
+/// then. Takes the read lock; the frames' keypoints are not copied under it. Without patches there
+/// are no aligned sightings either.
+MapContents take_contents(const Map& map, const ContentsKnown& known = {},
+                          bool with_patches = true);
 
 /// The keypoints of many frames, one after the other, borrowed for reading or writing. Colours,
 /// raw positions and words may be null.

@@ -22,6 +22,7 @@ class MapContentsAccess {
   static MapPointId next_point(const Map& map) { return map.next_point_; }
   /// Ascending ids.
   static std::vector<ArchivedPose> archived(const Map& map);
+  static bool is_archived(const Map& map, KeyFrameId id) { return map.archive_.count(id) > 0; }
   /// The same for one culled keyframe, relative to the root of its map.
   static ArchivedPose relative_to_root(const Map& map, KeyFrameId id);
 

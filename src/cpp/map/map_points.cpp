@@ -140,7 +140,10 @@ void Map::replace_point(MapPointId id, MapPointId by) {
 }
 
 void Map::set_patch(MapPointId id, std::shared_ptr<const PointPatch> patch) {
-  if (MapPoint* owner = points_.find(id)) owner->patch = std::move(patch);
+  MapPoint* owner = points_.find(id);
+  if (!owner) return;
+  owner->patch = std::move(patch);
+  points_.touch(id);
 }
 
 void Map::set_aligned(KeyFrameId id, std::size_t index, const AlignedSighting& sighting) {
@@ -148,11 +151,14 @@ void Map::set_aligned(KeyFrameId id, std::size_t index, const AlignedSighting& s
   if (!observer || observer->map_points[index] != sighting.point) return;
   if (observer->aligned.empty()) observer->aligned.resize(observer->map_points.size());
   observer->aligned[index] = sighting;
+  keyframes_.touch(id);
 }
 
 void Map::clear_aligned(KeyFrameId id, std::size_t index) {
   KeyFrame* observer = keyframes_.find(id);
-  if (observer && !observer->aligned.empty()) observer->aligned[index].variance = 0;
+  if (!observer || observer->aligned.empty()) return;
+  observer->aligned[index].variance = 0;
+  keyframes_.touch(id);
 }
 
 void Map::remember_replacement(MapPointId id, MapPointId by) {

@@ -28,10 +28,12 @@ class NoiseFactor {
   }
   /// Sets the value.
   void assume(double factor) { value_.store(factor, std::memory_order_relaxed); }
-  void forget() {
-    assume(kMost);
-    n_.store(0, std::memory_order_relaxed);
+  /// As it was before.
+  void restore(double factor, int n_measured) {
+    assume(factor);
+    n_.store(n_measured, std::memory_order_relaxed);
   }
+  void forget() { restore(kMost, 0); }
 
  private:
   static constexpr double kMemory = 20;  ///< adjustments

@@ -67,6 +67,57 @@ void restore_points(Map& map, const StoredMap& stored) {
   }
 }
 
+void restore_patches(Map& map, const StoredMap& stored,
+                     const std::vector<std::shared_ptr<const Frame>>& frames) {
+  const auto& rows = stored.patches;
+  if (rows.point.size == 0) return;
+  auto cameras = restore_cameras(stored);
+  auto scales = restore_scales(stored);
+  for (std::size_t i = 0; i < frames.size(); ++i) {  // those that the keyframes have already
+    const auto camera = static_cast<std::size_t>(stored.keyframes.camera[i]);
+    cameras[camera] = frames[i]->camera;
+    scales[camera] = frames[i]->scales;
+  }
+  constexpr std::size_t kValues = ReferencePatch::kSize * ReferencePatch::kSize;
+  for (std::size_t i = 0; i < rows.point.size; ++i) {
+    auto patch = std::make_shared<PointPatch>();
+    static_assert(sizeof(patch->patch.values) == kValues * sizeof(std::uint16_t));
+    std::memcpy(&patch->patch.values, rows.values + kValues * i, sizeof(patch->patch.values));
+    patch->patch.fraction = {rows.fraction[i][0], rows.fraction[i][1]};
+    patch->keyframe = KeyFrameId(rows.keyframe[i]);
+    patch->camera = cameras[static_cast<std::size_t>(rows.camera[i])];
+    patch->scales = scales[static_cast<std::size_t>(rows.camera[i])];
+    patch->level = rows.level[i];
+    patch->pixel = {rows.pixel[i][0], rows.pixel[i][1]};
+    map.set_patch(MapPointId(rows.point[i]), std::move(patch));
+  }
+}
+
+/// Sightings that were aligned to a patch that is gone do not count.
+void restore_aligned(Map& map, const StoredMap& stored) {
+  const auto& rows = stored.aligned;
+  for (std::size_t i = 0; i < rows.keyframe.size; ++i) {
+    AlignedSighting sighting;
+    sighting.point = MapPointId(rows.point[i]);
+    const MapPoint* point = map.find(sighting.point);
+    if (!point || !point->patch) continue;
+    sighting.u = rows.position[i][0];
+    sighting.v = rows.position[i][1];
+    sighting.right_u = rows.right_u[i];
+    sighting.variance = rows.variance[i];
+    sighting.right_variance = rows.right_variance[i];
+    sighting.reference = rows.reference[i] != 0;
+    map.set_aligned(KeyFrameId(rows.keyframe[i]), static_cast<std::size_t>(rows.keypoint[i]),
+                    sighting);
+  }
+  if (stored.noise.size != 2) return;
+  const auto restore = [](const NoiseRow& row, NoiseFactor& noise) {
+    noise.restore(row[0], static_cast<int>(row[1]));
+  };
+  restore(stored.noise[0], map.noise().position);
+  restore(stored.noise[1], map.noise().right);
+}
+
 }  // namespace
 
 KeyFrame& MapContentsAccess::add(Map& map, std::unique_ptr<KeyFrame> keyframe) {
@@ -210,6 +261,8 @@ void restore_map(Map& map, const StoredMap& stored,
   }
   restore_keyframes(map, stored, frames);
   restore_points(map, stored);
+  restore_patches(map, stored, frames);
+  restore_aligned(map, stored);
   const auto& edges = stored.covisibility;
   for (std::size_t i = 0; i < edges.a.size; ++i) {
     MapContentsAccess::set_weight(map, KeyFrameId(edges.a[i]), KeyFrameId(edges.b[i]),

@@ -54,6 +54,20 @@ struct StoredMap {
     Column<std::int32_t> weight;
   } covisibility;
   Column<std::array<std::int64_t, 2>> loop_edges;
+  struct {
+    Column<std::int64_t> point, keyframe, camera;
+    Column<std::uint8_t> level;
+    Column<std::array<float, 2>> pixel, fraction;
+    const std::uint16_t* values = nullptr;  ///< (q, ReferencePatch::kSize ^ 2)
+  } patches;
+  struct {
+    Column<std::int64_t> keyframe, point;
+    Column<std::int32_t> keypoint;
+    Column<std::array<float, 2>> position;
+    Column<float> right_u, variance, right_variance;
+    Column<std::uint8_t> reference;
+  } aligned;
+  Column<NoiseRow> noise;
 };
 
 /// The keypoints of the keyframes in the rows first_row .. end_row - 1.

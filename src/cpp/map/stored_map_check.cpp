@@ -287,6 +287,66 @@ void check_edges(const StoredMap& stored, const std::vector<std::size_t>& roots)
   }
 }
 
+void check_patches(const StoredMap& stored) {
+  constexpr float kHalf = 0.5F + 1e-3F;
+  const auto& rows = stored.patches;
+  for (std::size_t i = 0; i < rows.point.size; ++i) {
+    const std::string name = "the patch of " + point(rows.point[i]);
+    if (row_of(stored.points.ids, rows.point[i]) < 0 ||
+        (i > 0 && rows.point[i] <= rows.point[i - 1])) {
+      refuse(name + " has no such point, or is out of order");
+    }
+    if (row_of(stored.keyframes.ids, rows.keyframe[i]) < 0 &&
+        row_of(stored.removed_keyframes.ids, rows.keyframe[i]) < 0) {
+      refuse(name + " is of " + keyframe(rows.keyframe[i]) + ", which is not known");
+    }
+    const bool has_camera =
+        rows.camera[i] >= 0 && rows.camera[i] < static_cast<std::int64_t>(stored.cameras.size());
+    if (!has_camera) {
+      refuse(name + " has the camera " + std::to_string(rows.camera[i]) + ", which is not there");
+    }
+    const bool good =
+        rows.level[i] < stored.cameras[static_cast<std::size_t>(rows.camera[i])].n_levels &&
+        std::abs(rows.pixel[i][0]) <= kMaxCoordinate &&
+        std::abs(rows.pixel[i][1]) <= kMaxCoordinate && std::abs(rows.fraction[i][0]) <= kHalf &&
+        std::abs(rows.fraction[i][1]) <= kHalf;
+    if (!good) refuse(name + " has a number out of range");
+  }
+}
+
+void check_aligned(const StoredMap& stored) {
+  const auto& rows = stored.aligned;
+  const auto is_variance = [](float value) { return std::isfinite(value) && value >= 0; };
+  for (std::size_t i = 0; i < rows.keyframe.size; ++i) {
+    const std::string name = "the aligned keypoint " + std::to_string(rows.keypoint[i]) + " of " +
+                             keyframe(rows.keyframe[i]);
+    const std::int64_t row = row_of(stored.keyframes.ids, rows.keyframe[i]);
+    const bool ascends =
+        i == 0 || rows.keyframe[i] > rows.keyframe[i - 1] ||
+        (rows.keyframe[i] == rows.keyframe[i - 1] && rows.keypoint[i] > rows.keypoint[i - 1]);
+    if (row < 0 || !ascends) refuse(name + " has no such keyframe, or is out of order");
+    const auto& offsets = stored.keyframes.offsets;
+    const std::int64_t n =
+        offsets[static_cast<std::size_t>(row) + 1] - offsets[static_cast<std::size_t>(row)];
+    const bool good = rows.keypoint[i] >= 0 && rows.keypoint[i] < n && rows.point[i] >= 0 &&
+                      rows.point[i] < stored.next_point &&
+                      std::abs(rows.position[i][0]) <= kMaxCoordinate &&
+                      std::abs(rows.position[i][1]) <= kMaxCoordinate &&
+                      std::abs(rows.right_u[i]) <= kMaxCoordinate &&
+                      is_variance(rows.variance[i]) && is_variance(rows.right_variance[i]);
+    if (!good) refuse(name + " has a number out of range");
+  }
+  if (stored.noise.size != 0 && stored.noise.size != 2) {
+    refuse("the noise of aligned sightings has other numbers than two factors");
+  }
+  for (std::size_t i = 0; i < stored.noise.size; ++i) {
+    const auto [factor, measured] = stored.noise[i];
+    if (!(factor > 0 && factor <= 1 && measured >= 0 && measured <= kMaxCount)) {
+      refuse("the noise of aligned sightings has a number out of range");
+    }
+  }
+}
+
 }  // namespace
 
 void check_stored_map(const StoredMap& stored) {
@@ -295,6 +355,8 @@ void check_stored_map(const StoredMap& stored) {
   check_removed(stored);
   check_points(stored, roots);
   check_edges(stored, roots);
+  check_patches(stored);
+  check_aligned(stored);
 }
 
 void check_stored_keypoints(const StoredMap& stored, const StoredKeypoints& keypoints) {

@@ -22,29 +22,65 @@ constexpr double kGap = 0.5, kGapBefore = 3.0;
 constexpr double kRecent = 15.0;
 // Times closer than this are the same [s]; seconds since 1970 are exact to 2e-7.
 constexpr double kSame = 1e-6;
+// Time without a sample [s] at an end of an interval that the nearest one serves for.
+constexpr double kMissing = 1e-3;
 // Standard deviations [rad/s, m/s^2] of the prior on the bias of the first motion in a chain, which
 // nothing else determines.
 constexpr double kGyroDeviation = 5e-3, kAccelDeviation = 0.1;
+
+using Samples = std::vector<ImuSample>;
+
+void append(Samples::const_iterator first, Samples::const_iterator last, Samples& samples) {
+  for (; first != last; ++first) {
+    if (samples.empty() || first->t > samples.back().t + kSame) samples.push_back(*first);
+  }
+}
+
+Samples::const_iterator at_time(const Samples& samples, double t) {
+  return std::lower_bound(samples.begin(), samples.end(), t,
+                          [](const ImuSample& s, double time) { return s.t < time; });
+}
+
+/// Whether an IMU may join two moments, as far as is known without looking at all samples.
+bool covers(const Samples& samples, double begin, double end) {
+  return end > begin && end - begin <= kLongest && !samples.empty() &&
+         samples.front().t <= begin + kMissing && samples.back().t >= end - kMissing;
+}
+
+/// The samples in an interval, with one at or before its begin and one at or after its end.
+std::pair<Samples::const_iterator, Samples::const_iterator> around(const Samples& samples,
+                                                                   double begin, double end) {
+  auto first = at_time(samples, std::nextafter(begin + kSame, end));
+  if (first != samples.begin()) --first;
+  auto last = at_time(samples, end - kSame);
+  if (last != samples.end()) ++last;
+  return {first, last};
+}
 
 }  // namespace
 
 void InertialKeyframes::add_samples(const std::vector<ImuSample>& samples) {
   const std::lock_guard lock(mutex_);
-  for (const ImuSample& sample : samples) {
-    if (samples_.empty() || sample.t > samples_.back().t + kSame) samples_.push_back(sample);
-  }
+  append(samples.begin(), samples.end(), samples_.back());
 }
 
 void InertialKeyframes::set(KeyFrameId keyframe, const Eigen::Vector3d& velocity,
                             const ImuBias& bias, double scale) {
   const std::lock_guard lock(mutex_);
-  states_[keyframe] = {velocity, bias, scale};
+  set_state(keyframe, velocity, bias, scale);
+}
+
+void InertialKeyframes::set_state(KeyFrameId keyframe, const Eigen::Vector3d& velocity,
+                                  const ImuBias& bias, double scale) {
+  const auto [state, is_new] = states_.try_emplace(keyframe);
+  const std::size_t stretch = is_new ? samples_.size() - 1 : state->second.stretch;
+  state->second = {velocity, bias, scale, stretch, ++n_changes_};
 }
 
 void InertialKeyframes::clear() {
   const std::lock_guard lock(mutex_);
   states_.clear();
-  samples_.clear();
+  samples_.assign(1, {});
 }
 
 std::size_t InertialKeyframes::size() const {
@@ -66,12 +102,66 @@ bool InertialKeyframes::find(KeyFrameId keyframe, Eigen::Vector3d& velocity, Imu
   return true;
 }
 
+bool InertialKeyframes::newest_bias(ImuBias& bias) const {
+  const std::lock_guard lock(mutex_);
+  if (states_.empty()) return false;
+  bias = states_.rbegin()->second.bias;
+  return true;
+}
+
+InertialRows InertialKeyframes::take(const std::vector<KeyFrameId>& keyframes,
+                                     const std::vector<double>& times,
+                                     const std::vector<std::array<std::int64_t, 3>>& known) const {
+  const std::lock_guard lock(mutex_);
+  InertialRows rows;
+  const State* before = nullptr;
+  double time_before = 0;
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    const State* state = state_of(keyframes[i]);
+    if (state == nullptr) continue;
+    rows.versions.push_back(
+        {keyframes[i].value, before ? rows.ids.back().value : -1, state->last_change});
+    const bool is_known = std::binary_search(known.begin(), known.end(), rows.versions.back());
+    rows.changed.push_back(is_known ? 0 : 1);
+    rows.ids.push_back(keyframes[i]);
+    rows.velocity.push_back(state->velocity);
+    rows.scale.push_back(state->scale);
+    rows.bias.push_back(state->bias);
+    const Samples& samples = samples_[state->stretch];
+    if (!is_known && before && before->stretch == state->stretch &&
+        covers(samples, time_before, times[i])) {
+      const auto [first, last] = around(samples, time_before, times[i]);
+      rows.samples.insert(rows.samples.end(), first, last);
+    }
+    rows.offsets.push_back(rows.samples.size());
+    before = state;
+    time_before = times[i];
+  }
+  return rows;
+}
+
+void InertialKeyframes::put(const InertialRows& rows) {
+  const std::lock_guard lock(mutex_);
+  states_.clear();
+  samples_.clear();
+  for (std::size_t i = 0; i < rows.ids.size(); ++i) {
+    // Without samples nothing joins it to the state before.
+    if (i == 0 || rows.offsets[i] == rows.offsets[i + 1]) samples_.emplace_back();
+    append(rows.samples.begin() + static_cast<std::ptrdiff_t>(rows.offsets[i]),
+           rows.samples.begin() + static_cast<std::ptrdiff_t>(rows.offsets[i + 1]),
+           samples_.back());
+    set_state(rows.ids[i], rows.velocity[i], rows.bias[i], rows.scale[i]);
+  }
+  samples_.emplace_back();
+}
+
 std::vector<KeyFrameId> InertialKeyframes::newest(const Map& map, MapIndex which,
                                                   std::size_t n) const {
   const std::lock_guard lock(mutex_);
   std::vector<KeyFrameId> chain;
   // Ids grow with time.
   for (auto state = states_.rbegin(); state != states_.rend() && chain.size() < n; ++state) {
+    if (is_of_earlier_run(state->second)) break;
     const KeyFrame* keyframe = map.find(state->first);
     if (keyframe != nullptr && keyframe->map == which) chain.push_back(state->first);
   }
@@ -87,29 +177,30 @@ bool InertialKeyframes::is_needed(const Map& map, KeyFrameId id) const {
   const auto time_of = [&](auto state, auto end) {
     for (; state != end; ++state) {
       const KeyFrame* other = map.find(state->first);
-      if (other != nullptr && other->map == keyframe->map) return other->frame->timestamp;
+      const bool is_joined = state->second.stretch == at->second.stretch;
+      if (is_joined && other != nullptr && other->map == keyframe->map) {
+        return other->frame->timestamp;
+      }
     }
     return std::numeric_limits<double>::quiet_NaN();
   };
   const double before = time_of(std::make_reverse_iterator(at), states_.rend());
   const double after = time_of(std::next(at), states_.end());
   const double newest = time_of(states_.rbegin(), states_.rend());
-  if (std::isnan(after)) return true;    // the newest one
-  if (std::isnan(before)) return false;  // the chain begins later
+  if (is_of_earlier_run(at->second)) return after - before > kGapBefore;  // false at its ends
+  if (std::isnan(after)) return true;                                     // the newest one
+  if (std::isnan(before)) return false;                                   // the chain begins later
   return after - before > (newest - before < kRecent ? kGap : kGapBefore);
 }
 
-std::shared_ptr<const Preintegration> InertialKeyframes::between(double begin, double end,
+std::shared_ptr<const Preintegration> InertialKeyframes::between(std::size_t stretch, double begin,
+                                                                 double end,
                                                                  const ImuBias& bias) const {
-  if (!(end > begin) || end - begin > kLongest || samples_.empty()) return nullptr;
-  if (samples_.front().t > begin + 1e-3 || samples_.back().t < end - 1e-3) return nullptr;
-  const auto first = std::lower_bound(samples_.begin(), samples_.end(), begin - 0.1,
-                                      [](const ImuSample& s, double t) { return s.t < t; });
-  const auto last = std::lower_bound(first, samples_.end(), end + 0.1,
-                                     [](const ImuSample& s, double t) { return s.t < t; });
-  const std::vector<ImuSample> around(first, last);
-  if (around.size() < 2) return nullptr;
-  std::vector<ImuSample> samples = samples_between(around, begin, end);
+  const Samples& all = samples_[stretch];
+  if (!covers(all, begin, end)) return nullptr;
+  const Samples near(at_time(all, begin - 0.1), at_time(all, end + 0.1));
+  if (near.size() < 2) return nullptr;
+  std::vector<ImuSample> samples = samples_between(near, begin, end);
   // Of two readings at nearly the same time the one at the end of the interval stays.
   const auto same = [](const ImuSample& a, const ImuSample& b) { return !(b.t > a.t + kSame); };
   samples.erase(samples.begin() + 1,
@@ -148,7 +239,8 @@ void InertialKeyframes::add_to(GatheredBundle& bundle, const std::vector<KeyFram
     if (is_first) continue;
     const auto second = static_cast<std::uint32_t>(inertial.motions.size() - 1);
     const KeyFrame& before = *map.find(bundle.keyframes[inertial.motions[second - 1].camera]);
-    auto link = between(before.frame->timestamp, keyframe.frame->timestamp,
+    // Of this run, as the whole chain.
+    auto link = between(samples_.size() - 1, before.frame->timestamp, keyframe.frame->timestamp,
                         inertial.motions[second - 1].bias);
     if (link != nullptr) inertial.links.push_back({second - 1, second, std::move(link)});
   }
@@ -160,7 +252,7 @@ void InertialKeyframes::take_from(const GatheredBundle& bundle, const Map& map) 
     const KeyFrame* keyframe = map.find(bundle.keyframes[motion.camera]);
     if (motion.fixed || keyframe == nullptr) continue;
     const Eigen::Quaterniond& R_cw = bundle.problem.cameras[motion.camera].T_cw.rotation();
-    states_[keyframe->id] = {R_cw * motion.velocity, motion.bias, keyframe->scale};
+    set_state(keyframe->id, R_cw * motion.velocity, motion.bias, keyframe->scale);
   }
 }
 

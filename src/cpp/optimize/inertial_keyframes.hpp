@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -12,6 +14,24 @@
 namespace orbslam {
 
 struct GatheredBundle;
+
+/// Velocities and biases at keyframes with what was measured between them, as map files keep them.
+/// See docs/reference/map_file.md.
+struct InertialRows {
+  std::vector<KeyFrameId> ids;  ///< ascending
+  /// Of the IMU in the axes of the keyframe's camera, as long as it has this KeyFrame::scale.
+  std::vector<Eigen::Vector3d> velocity;
+  std::vector<double> scale;
+  std::vector<ImuBias> bias;
+  /// Samples from the row before to this one are [offsets[i], offsets[i + 1]). They cover the time
+  /// from one keyframe to the other, and are none where samples do not join the two.
+  std::vector<std::size_t> offsets{0};
+  std::vector<ImuSample> samples;
+  /// Per row the keyframe, the keyframe of the row before (-1 for none), and the number of the last
+  /// change of the state: equal ones are of equal rows.
+  std::vector<std::array<std::int64_t, 3>> versions;
+  std::vector<std::uint8_t> changed;  ///< one a row: its version is not known; else no samples
+};
 
 /// Samples of an IMU, and its velocities and biases at keyframes. They are stored outside the map.
 /// Velocities are in the axes of the keyframe and in units of the map, so code that moves keyframes
@@ -29,12 +49,23 @@ class InertialKeyframes {
   std::size_t size() const;
   /// False where there is none.
   bool find(KeyFrameId keyframe, Eigen::Vector3d& velocity, ImuBias& bias) const;
+  /// That of the keyframe with the highest id; false where there is none.
+  bool newest_bias(ImuBias& bias) const;
 
-  /// Newest keyframes with a state of a map, up to `n`, by time. The caller holds a lock of the
-  /// map.
+  /// Copies the states of these keyframes (ascending ids, with their time stamps [s]) and the
+  /// samples between them. Rows with a version in `known` (ascending) come without samples.
+  InertialRows take(const std::vector<KeyFrameId>& keyframes, const std::vector<double>& times,
+                    const std::vector<std::array<std::int64_t, 3>>& known = {}) const;
+  /// Replaces everything by the states of an earlier run. Samples that come later join none of
+  /// them, because times may begin anew.
+  void put(const InertialRows& rows);
+
+  /// Newest keyframes with a state of a map, up to `n`, by time; none of an earlier run. The caller
+  /// holds a lock of the map.
   std::vector<KeyFrameId> newest(const Map& map, MapIndex which, std::size_t n) const;
   /// Without this keyframe its neighbours in time would be too far apart: more than half a second,
-  /// or 3 s where the newest keyframe is 15 s later. The caller holds a lock of the map.
+  /// or 3 s where the newest keyframe is 15 s later, or of an earlier run. The caller holds a lock
+  /// of the map.
   bool is_needed(const Map& map, KeyFrameId keyframe) const;
   /// Adds motions of the cameras of a bundle that are in `chain`, and links between neighbours.
   /// The caller holds a lock of the map.
@@ -47,16 +78,25 @@ class InertialKeyframes {
     Eigen::Vector3d velocity;
     ImuBias bias;
     double scale = 1;
+    std::size_t stretch = 0;  ///< of samples_
+    std::int64_t last_change = 0;
   };
+  using Samples = std::vector<ImuSample>;
+
   const State* state_of(KeyFrameId keyframe) const;
-  std::shared_ptr<const Preintegration> between(double begin, double end,
+  void set_state(KeyFrameId keyframe, const Eigen::Vector3d& velocity, const ImuBias& bias,
+                 double scale);
+  bool is_of_earlier_run(const State& state) const { return state.stretch + 1 < samples_.size(); }
+  std::shared_ptr<const Preintegration> between(std::size_t stretch, double begin, double end,
                                                 const ImuBias& bias) const;
 
   Pose T_cb_;
   ImuNoise noise_;
   mutable std::mutex mutex_;
-  std::vector<ImuSample> samples_;
+  /// Stretches without a common time: those of earlier runs, and at the end that of this run.
+  std::vector<Samples> samples_{1};
   std::map<KeyFrameId, State> states_;
+  std::int64_t n_changes_ = 0;
 };
 
 }  // namespace orbslam

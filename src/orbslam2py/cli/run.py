@@ -53,6 +53,7 @@ from orbslam2py.cli.run_options import (
     RecordInputOption,
     SaveImagesFlag,
     SaveOption,
+    SavePatchesFlag,
     SeedOption,
     SensorOption,
     SequenceArgument,
@@ -135,6 +136,7 @@ def run(
     save: SaveOption = None,
     autosave: AutosaveOption = None,
     save_images: SaveImagesFlag = False,
+    save_patches: SavePatchesFlag = True,
     loop_closing: LoopClosingFlag = True,
     full_adjustment: FullAdjustmentFlag = True,
     full_adjustment_time_limit: FullAdjustmentTimeLimitOption = None,
@@ -165,6 +167,10 @@ def run(
     check_kept(video, record, record_input, force=force)
     if save_images and save is None:
         raise DatasetError("--save-images keeps images in the map that is saved: --save FILE")
+    if not save_patches and save is None:
+        raise DatasetError(
+            "--no-save-patches leaves patches out of the map that is saved: --save FILE"
+        )
     if new_map_after is not None and not several_maps:
         raise SettingsError(
             "--new-map-after says when another map begins, and with --one-map none does; leave out "
@@ -226,6 +232,7 @@ def run(
             effort=effort,
             config=dict(map(read_change, set_ or ())),
             keyframe_images=save_images,
+            point_patches=save_patches,
             seed=seed,
         ),
         realtime=realtime,

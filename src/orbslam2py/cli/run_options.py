@@ -249,6 +249,13 @@ SaveImagesFlag = Annotated[
     bool,
     typer.Option("--save-images", help="Keep a small grey image of every keyframe in the map."),
 ]
+SavePatchesFlag = Annotated[
+    bool,
+    typer.Option(
+        "--save-patches/--no-save-patches",
+        help="Keep the patches that sightings are aligned to in the map, a kilobyte per point.",
+    ),
+]
 
 
 # ---- the results ---------------------------------------------------------------------------------

@@ -4,10 +4,13 @@
 from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
 from orbslam2py.maps.compare import map_differences
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     Cameras,
     Covisibility,
+    ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
@@ -50,12 +53,14 @@ from orbslam2py.maps.snapshot import (
 from orbslam2py.maps.verify import verify_map_file
 
 __all__ = [
+    "AlignedSightings",
     "AlignmentRecord",
     "Cameras",
     "Covisibility",
     "ImageOfKeyframe",
     "ImagePairSequence",
     "ImageSequence",
+    "ImuStates",
     "Keyframes",
     "KeyframesSet",
     "MapArrays",
@@ -65,6 +70,7 @@ __all__ = [
     "MapFollower",
     "MapSnapshot",
     "Observations",
+    "Patches",
     "Placement",
     "Points",
     "PointsSet",

@@ -21,6 +21,7 @@ from orbslam2py import _core
 from orbslam2py._arguments import shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import MapFileError
+from orbslam2py.maps.schema import PATCH_SIZE
 from orbslam2py.settings.camera_model import CameraModel
 from orbslam2py.trajectory.rotations import (
     inverse_poses,
@@ -356,6 +357,118 @@ class RemovedKeyframes(ArrayGroup):
 
     def __len__(self) -> int:
         return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class ImuStates(ArrayGroup):
+    """States of the IMU at keyframes: (m,) entries each, then (s,) samples between them.
+
+    The samples from the entry before to entry i are ``offsets[i]:offsets[i + 1]``. They are raw
+    ones, because what is integrated of them depends on the biases.
+    """
+
+    ids: IntArray
+    """(m,) ids of keyframes, ascending."""
+    velocity: FloatArray
+    """(m, 3) of the IMU, in the axes of the keyframe's camera, in units of the map per second if
+    `Keyframes.scale` is `scale`; else it is to be multiplied by the quotient of both."""
+    scale: FloatArray
+    """(m,) `Keyframes.scale` when the velocity was stored."""
+    bias: FloatArray
+    """(m, 6) gyro [rad/s], accelerometer [m/s^2]."""
+    offsets: IntArray
+    """(m + 1,) offsets into `samples`."""
+    samples: FloatArray
+    """(s, 7) ``[t, gyro, accelerometer]``: seconds on the clock of the images, rad/s, m/s^2, in the
+    frame of the IMU. Those of an entry cover the time from the keyframe of the entry before, so
+    that the last ones of one entry may be the first ones of the next. An entry has none if samples
+    do not join the two keyframes."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @classmethod
+    def none(cls) -> ImuStates:
+        """No states."""
+        return cls(
+            np.zeros(0, np.int64),
+            np.zeros((0, 3)),
+            np.zeros(0),
+            np.zeros((0, 6)),
+            np.zeros(1, np.int64),
+            np.zeros((0, 7)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Patches(ArrayGroup):
+    """Patches of points, which sightings are aligned to: (q,) entries each, by ascending point.
+
+    ``docs/method/alignment.md#references``.
+    """
+
+    point: IntArray
+    """(q,) ids."""
+    keyframe: IntArray
+    """(q,) ids of the keyframes that they were cut from, living or removed."""
+    camera: IntArray
+    """(q,) rows of `Cameras`: of these keyframes."""
+    level: ByteArray
+    """(q,) level of the image pyramid."""
+    pixel: Float32Array
+    """(q, 2) x, y of the point in the image as given."""
+    fraction: Float32Array
+    """(q, 2) the point minus the patch's pixel (12, 12), in pixels of the level."""
+    values: NDArray[np.uint16]
+    """(q, 576) the 24 x 24 pixels row by row: 16 times the smoothed grey value."""
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+    @classmethod
+    def none(cls) -> Patches:
+        """No patches."""
+        ids = np.zeros(0, np.int64)
+        places = np.zeros((0, 2), np.float32)
+        values = np.zeros((0, PATCH_SIZE), np.uint16)
+        return cls(ids, ids, ids, np.zeros(0, np.uint8), places, places, values)
+
+
+@dataclass(frozen=True, eq=False)
+class AlignedSightings(ArrayGroup):
+    """Sightings that were aligned to patches: (a,) entries each, by ascending (keyframe, keypoint).
+
+    An entry counts as long as the keyframe observes this point with this keypoint.
+    """
+
+    keyframe: IntArray
+    """(a,) ids."""
+    keypoint: Int32Array
+    """(a,) number of the keypoint in its keyframe, from 0."""
+    point: IntArray
+    """(a,) ids."""
+    position: Float32Array
+    """(a, 2) undistorted pixels x, y."""
+    right_u: Float32Array
+    """(a,) column in the (virtual) right image [px]."""
+    variance: Float32Array
+    """(a,) of x and of y [px^2], as the patch says; 0 if alignment failed."""
+    right_variance: Float32Array
+    """(a,) of the right column [px^2]; 0: it has the noise of the keypoint."""
+    reference: BoolArray
+    """(a,) whether the patch was cut here."""
+
+    def __len__(self) -> int:
+        return len(self.keyframe)
+
+    @classmethod
+    def none(cls) -> AlignedSightings:
+        """No sightings."""
+        ids, numbers = np.zeros(0, np.int64), np.zeros(0, np.float32)
+        places = np.zeros((0, 2), np.float32)
+        return cls(
+            ids, np.zeros(0, np.int32), ids, places, numbers, numbers, numbers, np.zeros(0, bool)
+        )
 
 
 def _row_of(ids: IntArray, wanted: int, what: str) -> int:

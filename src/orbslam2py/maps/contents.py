@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -17,18 +17,23 @@ from orbslam2py._arguments import instance_of
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     ArrayGroup,
     Cameras,
     Covisibility,
+    ImuStates,
     Int32Array,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
 
 #: They follow from the descriptors and the vocabulary.
 _WORDS = "keyframes.words"
+#: Left out of the hash of a map without them, which is that of before there were any.
+_LATER = ("imu_states", "patches", "aligned", "alignment_noise")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +68,15 @@ class MapContents:
     upright_roots: tuple[int, ...] = ()
     """First keyframes of maps whose third axis is up and whose unit is the metre, by an IMU,
     ascending."""
+    imu_states: ImuStates = field(default_factory=ImuStates.none)
+    """What an IMU measured at and between keyframes; none without an IMU."""
+    patches: Patches = field(default_factory=Patches.none)
+    """What sightings of the points are aligned to."""
+    aligned: AlignedSightings = field(default_factory=AlignedSightings.none)
+    """Sightings that were aligned to these patches."""
+    alignment_noise: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    """(2, 2): of positions and of right columns the standard deviation of aligned sightings over
+    that of corners, and how often it was measured; (0, 2) if nothing was."""
 
     def observations_of_point(self, point_id: int) -> tuple[IntArray, Int32Array]:
         """Return the observations of a point.
@@ -137,13 +151,13 @@ class MapContents:
 
     def arrays(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """All arrays with their names (``"points.positions"``), in a fixed order."""
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
+        for one in dataclasses.fields(self):
+            value = getattr(self, one.name)
             if isinstance(value, ArrayGroup):
                 for name, array in value.arrays():
-                    yield f"{field.name}.{name}", array
+                    yield f"{one.name}.{name}", array
             elif isinstance(value, np.ndarray):
-                yield field.name, value
+                yield one.name, value
 
     def as_dict(self) -> dict[str, Any]:
         """All arrays and numbers by name, for the C++ core."""
@@ -176,7 +190,7 @@ class MapContents:
         """SHA-256 over all but `map_index` and words: equal for maps that are equal bit by bit."""
         digest = hashlib.sha256(f"{self.next_keyframe} {self.next_point}".encode())
         for name, array in self.arrays():
-            if name == _WORDS:
+            if name == _WORDS or self._is_missing(name.split(".")[0]):
                 continue
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)
@@ -185,6 +199,18 @@ class MapContents:
         if self.upright_roots:
             digest.update(f"\nupright_roots {self.upright_roots}".encode())
         return digest.hexdigest()
+
+    def _is_missing(self, group: str) -> bool:
+        return group in _LATER and not len(getattr(self, group))
+
+    def without_patches(self) -> MapContents:
+        """Return the map without patches, and without the sightings that were aligned to them."""
+        return dataclasses.replace(
+            self,
+            patches=Patches.none(),
+            aligned=AlignedSightings.none(),
+            alignment_noise=np.zeros((0, 2)),
+        )
 
 
 def contents_of(value: Any) -> MapContents:

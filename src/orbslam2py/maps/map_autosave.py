@@ -29,6 +29,7 @@ from orbslam2py.maps.map_file import MapFile, save_map
 from orbslam2py.maps.map_rows import Row, keypoint_rows, map_rows, run_rows, settings_rows
 from orbslam2py.maps.map_writer import MapWriter
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
+from orbslam2py.maps.schema import IDS_PER_PAGE, PATCHES_PER_PAGE
 from orbslam2py.settings.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -64,6 +65,10 @@ class MapAutosave:
         Options of the system, by name.
     earlier : SavedMap or MapFile, optional
         The file that the map was loaded from.
+    inertial : orbslam2py._core.InertialKeyframes, optional
+        Who has the states of an IMU at keyframes.
+    patches : bool
+        Keep the patches of points, and the sightings that were aligned to them.
     """
 
     def __init__(
@@ -76,8 +81,12 @@ class MapAutosave:
         seed: int,
         options: Mapping[str, Any],
         earlier: SavedMap | MapFile | None,
+        inertial: core.InertialKeyframes | None = None,
+        patches: bool = True,
     ) -> None:
         self._map = slam_map
+        self._inertial = inertial
+        self._patches = patches
         self._recorded = recorded
         self._settings = settings
         self._vocabulary = vocabulary
@@ -118,9 +127,13 @@ class MapAutosave:
         self._next_look = max(_FEW_IMAGES, 2 * len(self._images))
 
     # ---- whole files -----------------------------------------------------------------------------
+    def contents(self) -> MapContents:
+        """Return the map as arrays, at this moment."""
+        return take_contents(self._map, self._inertial, patches=self._patches)
+
     def saved_map(self) -> SavedMap:
         """Return all that a map file contains, at this moment."""
-        contents = take_contents(self._map)
+        contents = self.contents()
         runs = (*self._runs_before(contents), self._present_run(contents))
         images = self._images_in(contents)
         return SavedMap(contents, self._settings, self._vocabulary(), runs, images)
@@ -181,7 +194,7 @@ class MapAutosave:
             The state of the file: only later changes are examined. None: everything.
         """
         known = np.array(sorted(key[0] for key in writer.keys("keypoints")), np.int64)
-        return take_changes(self._map, known, before)
+        return take_changes(self._map, known, before, self._inertial, patches=self._patches)
 
     def update(
         self, writer: MapWriter, changes: ChangedContents, *, partly: bool, gently: bool = False
@@ -204,13 +217,20 @@ class MapAutosave:
             time.sleep(_BREAK)
         if not len(contents.keyframes):
             return False
-        looked_at = set(zip(changes.pages.tolist(), strict=True))
-        same = set(zip(contents.keyframes.ids[~changes.changed_keyframes].tolist(), strict=True))
+        looked_at = _keys(changes.pages)
+        same = _keys(contents.keyframes.ids[~changes.changed_keyframes])
         kept = {
             "keyframes": same,
             "covisibility": same,
+            "imu_states": _keys(contents.imu_states.ids[~changes.changed_states]),
             "map_points": writer.keys("map_points") - looked_at,
             "observations": writer.keys("observations") - looked_at,
+            "patches": {
+                page
+                for page in writer.keys("patches")
+                if (page[0] * PATCHES_PER_PAGE // IDS_PER_PAGE,) not in looked_at
+            },
+            "aligned": same,
         }
         rows = self._rows(changes, writer, partly=partly)
         n = writer.commit(_leaving_time(rows) if gently else rows, kept)
@@ -227,7 +247,7 @@ class MapAutosave:
             # Parts that are full change at the end alone; the last one is examined again.
             parts = sum(key[0] == number for key in writer.keys("frames"))
             yield from run_rows(number, run, first_part=max(0, parts - 1) if partly else 0)
-        yield from map_rows(contents, changes.changed_keyframes)
+        yield from map_rows(contents, changes.changed_keyframes, changes.changed_states)
         keys = zip(contents.keyframes.ids.tolist(), strict=True)
         written = writer.keys("keypoints")
         yield from keypoint_rows(contents, [i for i, key in enumerate(keys) if key not in written])
@@ -238,6 +258,11 @@ class MapAutosave:
     @cached_property
     def _identity(self) -> VocabularyIdentity:
         return self._vocabulary()
+
+
+def _keys(numbers: IntArray) -> set[Row]:
+    """Keys of rows by their single number."""
+    return set(zip(numbers.tolist(), strict=True))
 
 
 class _Autosave:

@@ -6,11 +6,13 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import path_of
+from orbslam2py._arguments import choice_of, path_of
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import contents_of
+from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.imu_states import check_states, put_states
 from orbslam2py.maps.map_copies import remember_metric_roots, set_upright
 from orbslam2py.maps.map_reader import check_contents, check_frames, opened, read_head
 from orbslam2py.maps.map_rows import all_rows
@@ -75,8 +77,9 @@ class MapFile:
         """
         with self._opened() as stored:
             rest = stored.without_keypoints()
-            core.MapRestorer(rest, stored.n_keypoints)
-            check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
+            arrays = rest.as_dict()
+            core.MapRestorer(arrays, stored.n_keypoints)
+            self._check(rest)
             for _ in stored.keypoint_parts():
                 pass  # their checksums and sizes are checked
 
@@ -85,6 +88,7 @@ class MapFile:
         slam_map: core.Map,
         vocabulary: core.Vocabulary | None = None,
         index: core.KeyFrameIndex | None = None,
+        inertial: core.InertialKeyframes | None = None,
     ) -> None:
         """Make the map.
 
@@ -97,6 +101,8 @@ class MapFile:
             this vocabulary.
         index
             Gets the keyframes with their words.
+        inertial
+            Gets the states of the IMU.
 
         Raises
         ------
@@ -107,13 +113,22 @@ class MapFile:
         with self._opened() as stored:
             fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
             rest = stored.without_keypoints()
-            restorer = core.MapRestorer(rest, stored.n_keypoints, vocabulary, fits)
-            check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
+            arrays = rest.as_dict()
+            restorer = core.MapRestorer(arrays, stored.n_keypoints, vocabulary, fits)
+            self._check(rest)
             for part, n_keyframes in stored.keypoint_parts():
                 restorer.add(part, n_keyframes)
             restorer.finish(slam_map, index)
+            if inertial is not None:
+                put_states(rest.imu_states, inertial)
         remember_metric_roots(slam_map, self.metric_roots)
         set_upright(slam_map, self.upright_roots)
+
+    def _check(self, contents: MapContents) -> None:
+        """Check what the core does not check."""
+        keyframes = contents.keyframes
+        check_frames(self.runs, keyframes.ids, contents.removed_keyframes.ids)
+        check_states(contents.imu_states, keyframes.ids, keyframes.timestamps)
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[MapTables]:
@@ -126,7 +141,7 @@ class MapFile:
         raise MapFileError(f"{self.source} was changed since it was opened; open it again")
 
 
-def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
+def save_map(saved: SavedMap, path: str | os.PathLike[str], *, patches: bool = True) -> None:
     """Write a map file; it gets its name only after it is complete.
 
     Parameters
@@ -135,6 +150,8 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
         The map, with all that is needed to use it.
     path
         The file, by custom with the suffix ``.orbmap``; an existing map is replaced.
+    patches
+        Write the patches of points, a kilobyte each, and the sightings that were aligned to them.
 
     Raises
     ------
@@ -143,6 +160,8 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
         if it exists and is no map; an existing file is kept.
     """
     contents_of(saved_of(saved).contents)
+    if not choice_of(patches, "patches"):
+        saved = replace(saved, contents=saved.contents.without_patches())
     path = path_of(path, "the map file", MapFileError)
     if not len(saved.contents.keyframes):
         raise MapFileError(

@@ -21,6 +21,7 @@ from orbslam2py._arrays import IntArray
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError, SettingsError
 from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.imu_states import check_states
 from orbslam2py.maps.map_copies import living_roots
 from orbslam2py.maps.map_tables import BlobTable, MapTables, read_one, read_rows
 from orbslam2py.maps.map_writer import connect
@@ -240,6 +241,7 @@ def _read_runs(connection: sqlite3.Connection, tables: dict[str, Table]) -> Iter
 def check_contents(contents: MapContents, runs: tuple[Run, ...]) -> None:
     """Raise `MapFileError` with the fault, unless this can be a map with its runs."""
     core.check_map_contents(contents.as_dict())
+    check_states(contents.imu_states, contents.keyframes.ids, contents.keyframes.timestamps)
     check_frames(runs, contents.keyframes.ids, contents.removed_keyframes.ids)
 
 

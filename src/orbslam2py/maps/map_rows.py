@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import IntArray
-from orbslam2py.maps.content_groups import Covisibility, Keyframes, model_name_of
+from orbslam2py.maps.content_groups import Covisibility, ImuStates, Keyframes, model_name_of
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.saved_map import Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.schema import (
     FRAMES_PER_ROW,
     IDS_PER_PAGE,
     IN_METRES,
+    PATCHES_PER_PAGE,
     TABLES,
     UPRIGHT,
     Blob,
@@ -77,7 +78,9 @@ def run_rows(number: int, run: Run, *, first_part: int = 0) -> Iterator[tuple[st
 
 # ---- the map ----------------------------------------------------------------------------------
 def map_rows(
-    contents: MapContents, changed_keyframes: NDArray[np.bool_] | None = None
+    contents: MapContents,
+    changed_keyframes: NDArray[np.bool_] | None = None,
+    changed_states: NDArray[np.bool_] | None = None,
 ) -> Iterator[tuple[str, Row]]:
     """All of the map but the keypoints of keyframes, as (table, row).
 
@@ -87,6 +90,8 @@ def map_rows(
         The map.
     changed_keyframes
         (k,) mask of the keyframes; all by default.
+    changed_states
+        (m,) mask of the states of the IMU; all by default.
     """
     if changed_keyframes is None:
         changed_keyframes = np.ones(len(contents.keyframes), bool)
@@ -104,6 +109,15 @@ def map_rows(
         yield "covisibility", (keyframe, *_blobs(TABLES["covisibility"], edges, which))
     for a, b in contents.loop_edges.tolist():
         yield "loop_edges", (a, b)
+    states = contents.imu_states
+    rows = range(len(states)) if changed_states is None else np.flatnonzero(changed_states)
+    yield from _imu_rows(states, rows)
+    patches, aligned = contents.patches, contents.aligned
+    yield from _page_rows("patches", patches, patches.point, PATCHES_PER_PAGE)
+    for keyframe, which in _groups(aligned.keyframe):
+        yield "aligned", (keyframe, *_blobs(TABLES["aligned"], aligned, which))
+    for number, (factor, measured) in enumerate(contents.alignment_noise.tolist()):
+        yield "alignment_noise", (number, factor, int(measured))
 
 
 def keypoint_rows(
@@ -200,8 +214,26 @@ def _removed_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
         yield "removed_keyframes", (keyframe, int(removed.parent[row]), poses[row], *scales)
 
 
-def _page_rows(name: str, group: object, ids: IntArray) -> Iterator[tuple[str, Row]]:
-    for page, which in _groups(ids // IDS_PER_PAGE):
+def _imu_rows(states: ImuStates, rows: Iterable[int]) -> Iterator[tuple[str, Row]]:
+    velocities, biases = states.velocity.astype("<f8"), states.bias.astype("<f8")
+    for row in rows:
+        samples = slice(int(states.offsets[row]), int(states.offsets[row + 1]))
+        yield (
+            "imu_states",
+            (
+                int(states.ids[row]),
+                velocities[row],
+                float(states.scale[row]),
+                biases[row],
+                *_blobs(TABLES["imu_states"], states, samples),
+            ),
+        )
+
+
+def _page_rows(
+    name: str, group: object, ids: IntArray, ids_each: int = IDS_PER_PAGE
+) -> Iterator[tuple[str, Row]]:
+    for page, which in _groups(ids // ids_each):
         yield name, (page, *_blobs(TABLES[name], group, which))
 
 

@@ -20,10 +20,13 @@ from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
     LENS_SIZE,
     MOUNT_SIZE,
+    AlignedSightings,
     Cameras,
     Covisibility,
+    ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
     model_number_of,
@@ -210,13 +213,13 @@ class MapTables:
         """Everything."""
         return self._contents(self._keypoints.whole())
 
-    def without_keypoints(self) -> dict[str, Any]:
-        """All but the keypoints (see `keypoint_parts`), for the C++ core."""
+    def without_keypoints(self) -> MapContents:
+        """All but the keypoints (see `keypoint_parts`)."""
         none = {
             blob.field: np.zeros((0, blob.width) if blob.width else 0, blob.dtype)
             for blob in self._tables["keypoints"].blobs
         }
-        return self._contents(none).as_dict()
+        return self._contents(none)
 
     def keypoint_parts(self) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
         """Keypoints of some keyframes each time, for the C++ core, and the number of keyframes."""
@@ -249,6 +252,46 @@ class MapTables:
             observations=Observations(**BlobTable(connection, tables["observations"]).whole()),
             covisibility=Covisibility(a=np.repeat(edges.keys[:, 0], edges.counts), **edges.whole()),
             loop_edges=np.array(loops, np.int64).reshape(-1, 2),
+            imu_states=self._imu_states(),
+            **self._alignment(),
+        )
+
+    def _alignment(self) -> dict[str, Any]:
+        """Patches, and sightings that were aligned to them."""
+        if "patches" not in self._tables:  # files of earlier versions
+            return {}
+        connection, tables = self._connection, self._tables
+        sightings = BlobTable(connection, tables["aligned"])
+        aligned = sightings.whole()
+        aligned["reference"] = aligned["reference"] != 0
+        noise = read_rows(connection, tables["alignment_noise"])
+        return {
+            "patches": Patches(**BlobTable(connection, tables["patches"]).whole()),
+            "aligned": AlignedSightings(
+                keyframe=np.repeat(sightings.keys[:, 0], sightings.counts), **aligned
+            ),
+            "alignment_noise": np.array([row[1:] for row in noise], np.float64).reshape(-1, 2),
+        }
+
+    def _imu_states(self) -> ImuStates:
+        if "imu_states" not in self._tables:  # files of earlier versions
+            return ImuStates.none()
+        rows = read_rows(self._connection, self._tables["imu_states"])
+        for keyframe, velocity, _, bias, count, samples in rows:
+            for name, blob, n in (
+                ("velocity", velocity, 3),
+                ("bias", bias, 6),
+                ("samples", samples, 7 * count),
+            ):
+                if len(blob) != 8 * n:
+                    raise MapFileError(f"{name} of imu_states {keyframe} has the wrong length")
+        return ImuStates(
+            ids=_column(rows, 0, np.int64),
+            velocity=_floats([row[1] for row in rows], 3),
+            scale=_column(rows, 2, np.float64),
+            bias=_floats([row[3] for row in rows], 6),
+            offsets=np.concatenate([[0], np.cumsum(_column(rows, 4, np.int64))]).astype(np.int64),
+            samples=_floats([row[5] for row in rows], 7),
         )
 
     def _keyframes(self, keypoints: dict[str, NDArray[Any]]) -> Keyframes:
@@ -327,4 +370,8 @@ def _column(rows: list[Row], place: int, dtype: Any) -> NDArray[Any]:
 def _poses(blobs: list[bytes]) -> NDArray[np.float64]:
     if any(len(blob) != 7 * 8 for blob in blobs):
         raise MapFileError("a pose has the wrong length")
-    return np.frombuffer(b"".join(blobs), "<f8").astype(np.float64).reshape(-1, 7)
+    return _floats(blobs, 7)
+
+
+def _floats(blobs: list[bytes], width: int) -> NDArray[np.float64]:
+    return np.frombuffer(b"".join(blobs), "<f8").astype(np.float64).reshape(-1, width)

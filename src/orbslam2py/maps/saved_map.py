@@ -142,6 +142,7 @@ class SavedMap:
         slam_map: core.Map,
         vocabulary: core.Vocabulary | None = None,
         index: core.KeyFrameIndex | None = None,
+        inertial: core.InertialKeyframes | None = None,
     ) -> None:
         """Make the map.
 
@@ -154,9 +155,13 @@ class SavedMap:
             vocabulary.
         index
             Gets the keyframes with their words.
+        inertial
+            Gets the states of the IMU.
         """
         fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
-        restore_contents(self.contents, slam_map, vocabulary, index, words_fit=fits)
+        restore_contents(
+            self.contents, slam_map, vocabulary, index, words_fit=fits, inertial=inertial
+        )
 
     def trajectory(
         self, run: int = -1, map_number: int | None = None, *, in_world: bool = False

@@ -8,8 +8,9 @@ from typing import NamedTuple
 #: Identifies map files among SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
 #: Version of the format that is written; later ones are refused. Version 1 had no words, and
-#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses, version 4 no rigs.
-FORMAT_VERSION = 5
+#: version 2 no rational lens (k4 to k6), version 3 no fisheye lenses, version 4 no rigs, version 5
+#: neither states of an IMU nor patches.
+FORMAT_VERSION = 6
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
 #: Other programs treat it as a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
@@ -17,6 +18,10 @@ IN_METRES = "# Maps in metres, by their roots:"
 UPRIGHT = "# Upright maps, by their roots:"
 #: A row of `map_points` and of `observations` holds the points of this number of ids.
 IDS_PER_PAGE = 256
+#: A row of `patches` holds those of this number of ids, fewer because each has a kilobyte.
+PATCHES_PER_PAGE = 32
+#: Numbers of a patch: 24 x 24.
+PATCH_SIZE = 576
 #: Frames in a row of `frames`.
 FRAMES_PER_ROW = 256
 
@@ -79,6 +84,28 @@ FRAMES = (
     Blob("poses", "T_cr", "<f8", 7),
     Blob("lost", "lost", "|u1"),
 )
+#: Patches of points, since version 6.
+PATCHES = (
+    Blob("points", "point", "<i8"),
+    Blob("keyframes", "keyframe", "<i8"),
+    Blob("cameras", "camera", "<i8"),
+    Blob("levels", "level", "|u1"),
+    Blob("raw_positions", "pixel", "<f4", 2),
+    Blob("fractions", "fraction", "<f4", 2),
+    Blob("grey_values", "values", "<u2", PATCH_SIZE),
+)
+#: Aligned sightings, since version 6.
+ALIGNED = (
+    Blob("keypoints", "keypoint", "<i4"),
+    Blob("points", "point", "<i8"),
+    Blob("positions", "position", "<f4", 2),
+    Blob("right_columns", "right_u", "<f4"),
+    Blob("variances", "variance", "<f4"),
+    Blob("right_variances", "right_variance", "<f4"),
+    Blob("is_reference", "reference", "|u1"),
+)
+#: Of an IMU, since version 6; rows ``[t, gyro, accelerometer]``.
+IMU_SAMPLES = (Blob("samples", "samples", "<f8", 7),)
 
 
 class Table(NamedTuple):
@@ -145,9 +172,17 @@ TABLES = {
         Table("observations", ("page",), (), OBSERVATIONS),
         Table("covisibility", ("keyframe",), (), COVISIBILITY),
         Table("loop_edges", ("a", "b")),
+        # Blobs of float64 (3,) and (6,), for the reason that a pose is one.
+        Table("imu_states", ("keyframe",), ("velocity", "scale", "bias"), IMU_SAMPLES),
+        Table("patches", ("page",), (), PATCHES),
+        Table("aligned", ("keyframe",), (), ALIGNED),
+        Table("alignment_noise", ("id",), ("factor", "measured")),
         Table("frames", ("run", "part"), (), FRAMES),
     )
 }
+
+#: The first version with a table that version 1 did not have.
+_SINCE = {"imu_states": 6, "patches": 6, "aligned": 6, "alignment_noise": 6}
 
 
 def tables_of(version: int) -> dict[str, Table]:
@@ -162,7 +197,8 @@ def tables_of(version: int) -> dict[str, Table]:
         older["cameras"] = cameras._replace(values=values)
     if version < 2:
         older["keypoints"] = Table("keypoints", ("keyframe",), (), KEYPOINTS[:-1])
-    return {**TABLES, **older}
+    tables = {**TABLES, **older}
+    return {name: table for name, table in tables.items() if version >= _SINCE.get(name, 1)}
 
 
 def _blob_columns(blobs: tuple[Blob, ...]) -> str:
@@ -182,9 +218,10 @@ def create_script(version: int = FORMAT_VERSION) -> str:
     rational_lens = "".join(f"  {name} REAL NOT NULL,\n" for name in lens)
     fisheye = "  model TEXT NOT NULL,\n  lens BLOB NOT NULL,\n" if version >= 4 else ""
     fisheye += "  mount BLOB NOT NULL,\n" if version >= 5 else ""
-    return _CREATE.format(
+    script = _CREATE.format(
         version=version, keypoints=keypoints, rational_lens=rational_lens, fisheye_lens=fisheye
     )
+    return script + "".join(_CREATE_LATER[name] for name in tables if name in _CREATE_LATER)
 
 
 #: Bytes at the beginning of a file that say whose SQLite file it is.
@@ -198,6 +235,42 @@ def application_of(header: bytes) -> int | None:
     return int.from_bytes(header[68:72], "big")
 
 
+_CREATE_LATER = {
+    "imu_states": f"""
+CREATE TABLE imu_states (
+  keyframe INTEGER PRIMARY KEY
+    REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  velocity BLOB NOT NULL,
+  scale REAL NOT NULL,
+  bias BLOB NOT NULL,
+  {_blob_columns(IMU_SAMPLES)}
+  checksum INTEGER NOT NULL
+) STRICT;
+""",
+    "patches": f"""
+CREATE TABLE patches (
+  page INTEGER PRIMARY KEY,
+  {_blob_columns(PATCHES)}
+  checksum INTEGER NOT NULL
+) STRICT;
+""",
+    "aligned": f"""
+CREATE TABLE aligned (
+  keyframe INTEGER PRIMARY KEY
+    REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  {_blob_columns(ALIGNED)}
+  checksum INTEGER NOT NULL
+) STRICT;
+""",
+    "alignment_noise": """
+CREATE TABLE alignment_noise (
+  id INTEGER PRIMARY KEY,
+  factor REAL NOT NULL,
+  measured INTEGER NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+""",
+}
 _CREATE = f"""
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {{version}};

@@ -266,4 +266,10 @@ def optimize_map(
     refined = take_contents(slam_map)
     # No keyframe comes or goes, and nothing here knows the vocabulary.
     keyframes = replace(refined.keyframes, words=contents.keyframes.words)
-    return replace(refined, map_index=contents.map_index, keyframes=keyframes), record
+    refined = replace(
+        refined,
+        map_index=contents.map_index,
+        keyframes=keyframes,
+        imu_states=contents.imu_states,
+    )
+    return refined, record

@@ -26,7 +26,7 @@ from orbslam2py.vocabulary.vocabulary import load_vocabulary, vocabulary_name
 
 _SWITCHES = (
     *("deterministic", "wait_for_mapping", "loop_closing", "full_adjustment", "several_maps"),
-    *("check_calibration", "keyframe_images"),
+    *("check_calibration", "keyframe_images", "point_patches"),
 )
 
 
@@ -49,6 +49,7 @@ class SystemOptions:
     full_adjustment: bool = True
     full_adjustment_time_limit: float | None = None
     keyframe_images: bool = False
+    point_patches: bool = True
     seed: int = 0
     check_calibration: bool = True
     several_maps: bool = True

@@ -19,6 +19,7 @@ from orbslam2py._arguments import is_finite, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError
+from orbslam2py.maps.imu_states import new_keeper
 from orbslam2py.maps.map_autosave import MapAutosave, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
@@ -142,8 +143,15 @@ class Pipeline:
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self._told_of_seconds = False
+        tracker = self.inertial_tracker
+        # Without an IMU the states of a loaded map are kept, for files.
+        self._imu_states = new_keeper() if tracker is None else tracker.keyframes
         if setup.loaded is not None:
-            setup.loaded.restore(back_end.map, setup.vocabulary, back_end.keyframe_index)
+            setup.loaded.restore(
+                back_end.map, setup.vocabulary, back_end.keyframe_index, self._imu_states
+            )
+            if tracker is not None:
+                tracker.map_loaded()
             self.tracking.begin_in_loaded_map(setup.initial_pose)
         self._last_map = -1 if setup.loaded is None else max(back_end.map.maps)
         self.keeper = MapAutosave(
@@ -154,6 +162,8 @@ class Pipeline:
             seed=options.seed,
             options=asdict(options),
             earlier=setup.loaded,
+            inertial=self._imu_states,
+            patches=options.point_patches,
         )
 
     def start(self) -> None:
@@ -428,8 +438,7 @@ class Pipeline:
         self.tracking.reset()
         self.front_end.reset()
         self.inertial.restart()
-        if self.inertial_tracker is not None:
-            self.inertial_tracker.reset()
+        self._forget_imu()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
 
@@ -450,7 +459,14 @@ class Pipeline:
             _log.info("map %d ends", map_index)
             self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
             self.tracking.restart()
+            self._forget_imu()
         return True
+
+    def _forget_imu(self) -> None:
+        """Drop the states at keyframes, whose numbers begin anew."""
+        self._imu_states.clear()
+        if self.inertial_tracker is not None:
+            self.inertial_tracker.reset()
 
 
 def _at_once(work: Callable[[], None]) -> None:

@@ -11,6 +11,7 @@ from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.edits.parts import put_together
+from orbslam2py.maps.imu_states import states_of_part
 from orbslam2py.maps.map_copies import restore_contents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_made_alike, check_vocabulary
@@ -93,7 +94,9 @@ def merge_maps(
         for map_index in sorted({merge.map_index for merge in closing.merges}):
             if map_index in slam_map.maps:
                 adjustment.run(map_index)
-    return replace(together, contents=take_contents(slam_map)), closing.merges
+    contents = take_contents(slam_map)
+    states = states_of_part(together.contents.imu_states, contents.keyframes)
+    return replace(together, contents=replace(contents, imu_states=states)), closing.merges
 
 
 def _compare(slam_map: core.Map, index: core.KeyFrameIndex, closing: LoopClosing) -> None:

@@ -27,7 +27,6 @@ from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.inertial.samples import ImuSamples
 from orbslam2py.maps.contents import MapContents
-from orbslam2py.maps.map_copies import take_contents
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.maps.saved_map import SavedMap
@@ -97,6 +96,9 @@ class System:
         Functions that receive loops, keyframes, losses and changes of the map.
     keyframe_images : bool
         Store a small grey JPEG of every keyframe in map files.
+    point_patches : bool
+        Store the patches of points, a kilobyte each, and the sightings that were aligned to them,
+        in map files, so that sightings of old points are aligned in a loaded map.
     seed : int
         Seed of all random numbers.
     several_maps : bool
@@ -157,6 +159,7 @@ class System:
         full_adjustment_time_limit: float | None = None,
         callbacks: Callbacks | None = None,
         keyframe_images: bool = False,
+        point_patches: bool = True,
         seed: int = 0,
         check_calibration: bool = True,
         several_maps: bool = True,
@@ -172,6 +175,7 @@ class System:
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
             keyframe_images=keyframe_images,
+            point_patches=point_patches,
             seed=seed,
             check_calibration=check_calibration,
             several_maps=several_maps,
@@ -601,7 +605,7 @@ class System:
 
     def map_contents(self) -> MapContents:
         """Return all data of the map as arrays; may be called while the system runs."""
-        return take_contents(self.pipeline.back_end.map)
+        return self.pipeline.keeper.contents()
 
     @property
     def imu_check(self) -> ImuCheck | None:

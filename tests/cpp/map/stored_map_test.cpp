@@ -40,6 +40,9 @@ class WrittenMap {
     put(stored.covisibility.b, contents.covisibility.b);
     put(stored.covisibility.weight, contents.covisibility.weight);
     put(stored.loop_edges, contents.loop_edges);
+    write_patches(contents.patches);
+    write_aligned(contents.aligned);
+    put(stored.noise, contents.noise);
   }
 
   /// Fills a map with it, after all checks.
@@ -152,6 +155,53 @@ class WrittenMap {
     put(columns.first_frame, rows.first_frame);
   }
 
+  void write_patches(const PatchRows& rows) {
+    using Two = std::array<float, 2>;
+    std::vector<std::int64_t> keyframe;
+    std::vector<std::uint8_t> level;
+    std::vector<Two> pixel, fraction;
+    std::vector<decltype(ReferencePatch::values)> values;
+    for (const auto& patch : rows.patches) {
+      keyframe.push_back(patch->keyframe.value);
+      level.push_back(static_cast<std::uint8_t>(patch->level));
+      pixel.push_back({patch->pixel.x(), patch->pixel.y()});
+      fraction.push_back({patch->patch.fraction.x(), patch->patch.fraction.y()});
+      values.push_back(patch->patch.values);
+    }
+    auto& columns = stored.patches;
+    put(columns.point, rows.point);
+    put(columns.keyframe, keyframe);
+    put(columns.camera, rows.camera);
+    put(columns.level, level);
+    put(columns.pixel, pixel);
+    put(columns.fraction, fraction);
+    columns.values = keep<std::uint16_t>(values);
+  }
+
+  void write_aligned(const AlignedRows& rows) {
+    std::vector<std::int64_t> point;
+    std::vector<std::array<float, 2>> position;
+    std::vector<float> right_u, variance, right_variance;
+    std::vector<std::uint8_t> reference;
+    for (const AlignedSighting& sighting : rows.sightings) {
+      point.push_back(sighting.point.value);
+      position.push_back({sighting.u, sighting.v});
+      right_u.push_back(sighting.right_u);
+      variance.push_back(sighting.variance);
+      right_variance.push_back(sighting.right_variance);
+      reference.push_back(sighting.reference ? 1 : 0);
+    }
+    auto& columns = stored.aligned;
+    put(columns.keyframe, rows.keyframe);
+    put(columns.keypoint, rows.keypoint);
+    put(columns.point, point);
+    put(columns.position, position);
+    put(columns.right_u, right_u);
+    put(columns.variance, variance);
+    put(columns.right_variance, right_variance);
+    put(columns.reference, reference);
+  }
+
   static constexpr std::size_t kPart = 2;  ///< keyframes whose keypoints come at once
 
   ReadableKeypoints keypoints_;
@@ -175,6 +225,48 @@ struct MapWithLoop : MapBuilder {
   }
 };
 
+/// Points 36 to 39 are seen by all three keyframes that live.
+struct MapWithPatches : MapWithLoop {
+  MapWithPatches() {
+    add_points(4, kfs({0, 1, 3}));
+    add_patch(kPoint, kf(1));
+    add_patch(kOfCulled, kf(2));
+    align(kf(0), kPoint, 0.25F);
+    align(kf(1), kPoint, 0);  // in vain
+    align(kf(0), kOfCulled, 0.5F);
+    align(kf(0), kBare, 0.5F);  // to a patch that is gone
+    map.noise().position.restore(0.25, 7);
+  }
+
+  static constexpr MapPointId kPoint{36}, kOfCulled{37}, kBare{38};
+
+  std::size_t slot_of(KeyFrameId keyframe, MapPointId point) const {
+    return map.find(point)->observation_of(keyframe)->index;
+  }
+  void add_patch(MapPointId point, KeyFrameId keyframe) {
+    auto patch = std::make_shared<PointPatch>();
+    for (auto& row : patch->patch.values) row.fill(static_cast<std::uint16_t>(point.value));
+    patch->patch.fraction = {0.25F, -0.5F};
+    patch->keyframe = keyframe;
+    patch->camera = map.find(kf(0))->frame->camera;
+    patch->scales = map.find(kf(0))->frame->scales;
+    patch->level = 1;
+    patch->pixel = {12.5F, 13.5F};
+    map.set_patch(point, std::move(patch));
+  }
+  void align(KeyFrameId keyframe, MapPointId point, float variance) {
+    AlignedSighting sighting;
+    sighting.point = point;
+    sighting.u = 1.5F;
+    sighting.v = 2.5F;
+    sighting.right_u = 3.5F;
+    sighting.variance = variance;
+    sighting.right_variance = 0.125F;
+    sighting.reference = point == kPoint;
+    map.set_aligned(keyframe, slot_of(keyframe, point), sighting);
+  }
+};
+
 TEST(StoredMap, ComesBackBitByBit) {
   MapWithLoop small;
   Map restored;
@@ -186,6 +278,58 @@ TEST(StoredMap, ComesBackBitByBit) {
   EXPECT_TRUE(restored.scaled_pose(kf(2)).T_cw.matrix() ==
               small.map.scaled_pose(kf(2)).T_cw.matrix());
   EXPECT_FALSE(restored.erase_keyframe(kf(3))) << "a loop edge protects it";
+}
+
+TEST(StoredMap, HasPatchesAndAlignedSightings) {
+  using M = MapWithPatches;
+  M small;
+  Map restored;
+  WrittenMap(small.map).restore(restored);
+  for (const MapPointId point : {M::kPoint, M::kOfCulled}) {
+    ASSERT_NE(restored.find(point)->patch, nullptr);
+    const PointPatch& patch = *restored.find(point)->patch;
+    const PointPatch& was = *small.map.find(point)->patch;
+    EXPECT_EQ(patch.patch.values, was.patch.values);
+    EXPECT_EQ(patch.patch.fraction, was.patch.fraction);
+    EXPECT_EQ(patch.pixel, was.pixel);
+    EXPECT_EQ(patch.keyframe, was.keyframe);
+    EXPECT_EQ(patch.level, 1);
+    EXPECT_EQ(patch.camera, restored.find(kf(0))->frame->camera) << "one for all of them";
+  }
+  const auto aligned_at = [&](KeyFrameId keyframe, MapPointId point) {
+    return restored.find(keyframe)->aligned_at(small.slot_of(keyframe, point), point);
+  };
+  const AlignedSighting* aligned = aligned_at(kf(0), M::kPoint);
+  ASSERT_NE(aligned, nullptr);
+  EXPECT_EQ(aligned->u, 1.5F);
+  EXPECT_EQ(aligned->right_u, 3.5F);
+  EXPECT_EQ(aligned->variance, 0.25F);
+  EXPECT_EQ(aligned->right_variance, 0.125F);
+  EXPECT_TRUE(aligned->reference);
+  EXPECT_NE(aligned_at(kf(0), M::kOfCulled), nullptr);
+  EXPECT_EQ(aligned_at(kf(0), M::kBare), nullptr);
+  const AlignedSighting& in_vain = restored.find(kf(1))->aligned[small.slot_of(kf(1), M::kPoint)];
+  EXPECT_EQ(in_vain.point, M::kPoint) << "it is not tried again";
+  EXPECT_FALSE(in_vain.ok());
+  EXPECT_EQ(restored.noise().position.value(), 0.25);
+  EXPECT_EQ(restored.noise().position.n_measured(), 7);
+  const MapContents without = take_contents(restored, {}, false);
+  EXPECT_TRUE(without.patches.point.empty() && without.aligned.keyframe.empty());
+  EXPECT_TRUE(without.noise.empty());
+}
+
+TEST(StoredMap, OnlyChangedAlignmentsAreCopiedAgain) {
+  using M = MapWithPatches;
+  M small;
+  const MapContents all = take_contents(small.map);
+  EXPECT_EQ(all.aligned.keyframe, (std::vector<KeyFrameId>{kf(0), kf(0), kf(1)}));
+  const ContentsKnown known{all.keyframe_stamp, all.point_stamp, all.incomplete_pages};
+  const MapContents none = take_contents(small.map, known);
+  EXPECT_TRUE(none.aligned.keyframe.empty() && none.patches.point.empty());
+  small.map.clear_aligned(kf(1), small.slot_of(kf(1), M::kPoint));
+  EXPECT_EQ(take_contents(small.map, known).aligned.keyframe, (std::vector<KeyFrameId>{kf(1)}));
+  small.add_patch(M::kBare, kf(1));
+  EXPECT_EQ(take_contents(small.map, known).patches.point.size(), 3U);
 }
 
 TEST(StoredMap, IdsGoOnWhereTheyEnded) {
@@ -232,7 +376,7 @@ TEST(StoredMap, WhateverWasDoneToAMapItComesBack) {
 /// Numbers in a file are never trusted: every spoilt map is refused or is a sound one. The
 /// sanitizers watch what happens on the way.
 TEST(StoredMap, SpoiltOnesAreRefusedOrSound) {
-  const MapWithLoop small;
+  const MapWithPatches small;
   std::mt19937_64 random(7);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
   int n_refused = 0, n_restored = 0;

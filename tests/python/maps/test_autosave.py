@@ -85,11 +85,11 @@ def test_a_reset_in_the_moment_of_a_save(tmp_path: Path, monkeypatch: pytest.Mon
         old = slam.map_contents()
         take_changes = map_autosave.take_changes
 
-        def reset_first(*arguments: Any) -> Any:
+        def reset_first(*arguments: Any, **options: Any) -> Any:
             monkeypatch.setattr(map_autosave, "take_changes", take_changes)
             slam.reset()
             small_sequences.play(slam, 6)
-            return take_changes(*arguments)
+            return take_changes(*arguments, **options)
 
         monkeypatch.setattr(map_autosave, "take_changes", reset_first)
         slam.save_map(path)
@@ -430,11 +430,11 @@ def test_a_system_that_is_dropped_in_the_thread_that_saves(
     small_sequences.play(system := new_system(), 5)
     taken, dropped = map_autosave.take_changes, threading.Event()
 
-    def take_and_drop(*arguments: Any) -> Any:
+    def take_and_drop(*arguments: Any, **options: Any) -> Any:
         if threading.current_thread().name == "autosave" and not dropped.is_set():
             dropped.set()
             system._finalizer()
-        return taken(*arguments)
+        return taken(*arguments, **options)
 
     monkeypatch.setattr(map_autosave, "take_changes", take_and_drop)
     system.autosave(path, every=0.01)

@@ -48,7 +48,7 @@ def test_a_second_file_of_a_loaded_map_holds_the_same(tmp_path: Path) -> None:
 def test_it_is_a_database_with_strict_tables_and_foreign_keys(tmp_path: Path) -> None:
     with closing(sqlite3.connect(written(tmp_path))) as connection:
         assert connection.execute("PRAGMA application_id").fetchone() == (APPLICATION_ID,)
-        assert connection.execute("PRAGMA user_version").fetchone() == (5,)
+        assert connection.execute("PRAGMA user_version").fetchone() == (6,)
         strict = {row[1]: row[5] for row in connection.execute("PRAGMA table_list")}
         assert all(strict[name] for name in TABLES)
         assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
@@ -145,8 +145,8 @@ def test_what_is_no_map_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_newer_version_is_refused(tmp_path: Path) -> None:
-    path = edit(written(tmp_path), "PRAGMA user_version = 6")
-    _refused(path, "version 6", "update orbslam2py")
+    path = edit(written(tmp_path), "PRAGMA user_version = 7")
+    _refused(path, "version 7", "update orbslam2py")
 
 
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.7, 0.99])

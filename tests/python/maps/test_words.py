@@ -89,13 +89,14 @@ def test_known_words_are_not_searched_again() -> None:
     assert take_contents(restored).keyframes.words[7] == 5
 
 
-@pytest.mark.parametrize("version", [1, 2, 3, 4])
+@pytest.mark.parametrize("version", [1, 2, 3, 4, 5])
 def test_a_map_of_an_earlier_version_is_used_like_any(tmp_path: Path, version: int) -> None:
     old, new = written_as_version(version, tmp_path), written(tmp_path)
     saved = load_map(old)
     assert bool(len(saved.contents.keyframes.words)) == (version > 1)
     assert saved.contents.cameras.distortion.tolist() == [[0.0] * 8]
-    assert small_map().contents.first_difference(saved.contents) is None
+    assert small_map().contents.without_patches().first_difference(saved.contents) is None
+    save_map(small_map(), new, patches=False)
     assert np.array_equal(_poses_in(old), _poses_in(new))
     save_map(saved, tmp_path / "again.orbmap")
     assert np.array_equal(_poses_in(tmp_path / "again.orbmap"), _poses_in(new))

@@ -11,7 +11,7 @@ from pathlib import Path
 from orbslam2py import Sensor, load_vocabulary
 from orbslam2py.maps import SavedMap, load_map, save_map
 from orbslam2py.maps.map_rows import all_rows, checksum
-from orbslam2py.maps.schema import TABLES, create_script
+from orbslam2py.maps.schema import TABLES, create_script, tables_of
 from support import small_sequences
 
 #: Frames of the mapping run: enough for several keyframes and a culled one.
@@ -36,16 +36,18 @@ def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
 def written_as_version(version: int, folder: Path) -> Path:
     """The small map as an earlier version of the format had it.
 
-    Version 4 had no rigs, version 3 no fisheye lenses, version 2 no rational ones; version 1 had
-    no words, and a short hash of the vocabulary.
+    Version 5 had neither states of an IMU nor patches, version 4 no rigs, version 3 no fisheye
+    lenses, version 2 no rational ones; version 1 had no words, and a short hash of the vocabulary.
     """
     path = folder / f"version_{version}.orbmap"
-    sums: dict[str, list[int]] = {name: [] for name in TABLES}
+    sums: dict[str, list[int]] = {name: [] for name in tables_of(version)}
     with closing(sqlite3.connect(path)) as connection, connection:
         connection.executescript(create_script(version))
         for name, present in all_rows(small_map()):
+            if name not in sums:
+                continue
             row = present[:-1] if name == "keypoints" and version < 2 else present
-            if name == "cameras":
+            if name == "cameras" and version < 5:
                 without = present[: -1 if version == 4 else -3]
                 row = without if version >= 3 else (*without[:10], *without[13:])
             if name == "vocabulary" and version < 2:

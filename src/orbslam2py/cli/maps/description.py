@@ -51,6 +51,11 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
     if numbers.max() == 0:
         yield "path", f"{_way(saved, numbers == 0, unit)} from keyframe to keyframe"
         yield "cameras stood in", _box(keyframes.T_wc[:, :3, 3], unit)
+    if len(contents.imu_states):
+        yield "IMU states", number_of(len(contents.imu_states), "keyframe")
+    if len(contents.patches):
+        aligned = int((contents.aligned.variance > 0).sum())
+        yield "patches", f"of {len(contents.patches)} points, {aligned} aligned sightings"
     yield "colours", f"of {int(keyframes.has_colours.sum())} keyframes"
     yield "images", f"of {len(saved.images)} keyframes"
     for number, run in enumerate(saved.runs):

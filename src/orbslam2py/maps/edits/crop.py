@@ -12,13 +12,21 @@ from numpy.typing import NDArray
 from orbslam2py._arguments import array_of, is_number, shown
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.content_groups import Covisibility, Keyframes, Observations, RemovedKeyframes
+from orbslam2py.maps.content_groups import (
+    AlignedSightings,
+    Covisibility,
+    Keyframes,
+    Observations,
+    Patches,
+    RemovedKeyframes,
+)
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.edits.spanning_tree import (
     count_covisibility,
     map_numbers,
     spanning_parents,
 )
+from orbslam2py.maps.imu_states import states_of_part
 
 BoolArray = NDArray[np.bool_]
 
@@ -174,8 +182,10 @@ def keep_keyframes(
         loop_edges=contents.loop_edges[np.isin(contents.loop_edges, keyframes.ids).all(axis=1)],
         metric_roots=roots_now(contents.metric_roots),
         upright_roots=roots_now(contents.upright_roots),
+        imu_states=states_of_part(contents.imu_states, keyframes),
     )
     cropped = _select_points(cropped, np.isin(contents.points.ids, observations.point))
+    cropped = _select_alignment(cropped)
     root = int(keyframes.ids[0])
     return cropped if root == 0 else _renumbered(cropped, root)
 
@@ -257,6 +267,20 @@ def _select_points(contents: MapContents, kept: BoolArray) -> MapContents:
     return refresh_distances(replace(contents, points=points), ~referred)
 
 
+def _select_alignment(contents: MapContents) -> MapContents:
+    """Drop patches without their point or the pose of their keyframe, and what they served."""
+    patches, aligned, seen = contents.patches, contents.aligned, contents.observations
+    known = np.concatenate([contents.keyframes.ids, contents.removed_keyframes.ids])
+    stay = np.isin(patches.point, contents.points.ids) & np.isin(patches.keyframe, known)
+    patches = Patches(**{name: array[stay] for name, array in patches.arrays()})
+    # One keyframe has not more than 2^20 keypoints.
+    there = seen.keyframe * 2**20 + seen.keypoint
+    counts = np.isin(aligned.keyframe * 2**20 + aligned.keypoint, there)
+    counts &= np.isin(aligned.point, patches.point)
+    aligned = AlignedSightings(**{name: array[counts] for name, array in aligned.arrays()})
+    return replace(contents, patches=patches, aligned=aligned)
+
+
 def refresh_distances(contents: MapContents, which: BoolArray) -> MapContents:
     """Compute the range of distances of some points again, from their reference keyframes.
 
@@ -296,8 +320,12 @@ def _renumbered(contents: MapContents, root: int) -> MapContents:
     # Points that the old keyframe 0 made were not made by the new one.
     reference = new(points.reference_keyframe)
     made_by_old = points.first_keyframe == 0
+    states = contents.imu_states
     return replace(
         contents,
+        imu_states=replace(states, ids=new(states.ids)),
+        patches=replace(contents.patches, keyframe=new(contents.patches.keyframe)),
+        aligned=replace(contents.aligned, keyframe=new(contents.aligned.keyframe)),
         keyframes=replace(keyframes, ids=new(keyframes.ids), parent=new(keyframes.parent)),
         removed_keyframes=replace(
             contents.removed_keyframes, parent=new(contents.removed_keyframes.parent)

@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
+    AlignedSightings,
     ArrayGroup,
     BoolArray,
     Cameras,
     Covisibility,
+    ImuStates,
     Keyframes,
     Observations,
+    Patches,
     Points,
     RemovedKeyframes,
 )
@@ -242,6 +245,9 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
     keyframes = together(Keyframes, keyframes_of, ids=keyframe, parent=keyframe, camera=camera)
     counts = [np.diff(part.keyframes.offsets) for part in parts]
     offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
+    states = together(ImuStates, lambda part: part.imu_states, ids=keyframe)
+    n_samples = np.concatenate([np.diff(part.imu_states.offsets) for part in parts])
+    samples_end = np.concatenate([[0], np.cumsum(n_samples)]).astype(np.int64)
     return replace(
         parts[0],
         map_index=0,
@@ -276,7 +282,20 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
             for part, by in zip(parts, keyframe[:-1].tolist(), strict=True)
             for root in part.upright_roots
         ),
+        imu_states=replace(states, offsets=samples_end),
+        patches=together(
+            Patches, lambda part: part.patches, point=point, keyframe=keyframe, camera=camera
+        ),
+        aligned=together(
+            AlignedSightings, lambda part: part.aligned, point=point, keyframe=keyframe
+        ),
+        alignment_noise=_noise_of_all(parts),
     )
+
+
+def _noise_of_all(parts: Sequence[MapContents]) -> FloatArray:
+    """That of the map which measured it most often: a system has one for all its maps."""
+    return max((part.alignment_noise for part in parts), key=lambda noise: noise[:, 1].sum())
 
 
 def _complete(keyframes: Keyframes, all_of_them: Sequence[Keyframes]) -> Keyframes:

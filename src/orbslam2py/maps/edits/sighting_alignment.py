@@ -132,7 +132,8 @@ def align_sightings(
         )
     if not is_whole(rounds) or rounds < 1:
         raise MapFileError(f"rounds is {shown(rounds)}; give a whole number of at least 1")
-    slam_map = restore_contents(contents)
+    # Corners, as long as this has not aligned them: those that are aligned belong to other patches.
+    slam_map = restore_contents(contents.without_patches())
     alignment = core.SightingAlignment(slam_map)
     images = _Images(contents, alignment.keyframes, sequence, rounds, progress)
     error_before = alignment.median_error
@@ -152,7 +153,16 @@ def align_sightings(
     # No keyframe comes or goes, and nothing here knows the vocabulary.
     keyframes = replace(refined.keyframes, words=contents.keyframes.words)
     record = _record(alignment, images, error_before, used, time.perf_counter() - began)
-    return replace(refined, map_index=contents.map_index, keyframes=keyframes), record
+    refined = replace(
+        refined,
+        map_index=contents.map_index,
+        keyframes=keyframes,
+        imu_states=contents.imu_states,
+        patches=contents.patches,
+        aligned=contents.aligned,
+        alignment_noise=contents.alignment_noise,
+    )
+    return refined, record
 
 
 class _Images:

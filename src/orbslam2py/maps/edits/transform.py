@@ -24,7 +24,8 @@ def transform_map(
     """Transform a whole map, with all its lengths and directions.
 
     A scale other than 1 also changes depths, scale ranges of points, baselines of cameras, and the
-    scale of frames relative to keyframes (`Keyframes.scale`). Pixels do not change.
+    scale of frames relative to keyframes (`Keyframes.scale`). Pixels do not change, nor do
+    velocities of an IMU in the axes of their cameras, whose lengths follow `Keyframes.scale`.
 
     Parameters
     ----------

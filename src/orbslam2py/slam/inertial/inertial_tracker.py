@@ -40,6 +40,10 @@ _log = logging.getLogger(__name__)
 
 #: Deviations of gravity [rad] and of the scale's logarithm in an upright map from a file.
 _LOADED = (0.01, 0.01)
+#: Deviations of the biases of a loaded map: gyro [rad/s], accelerometer [m/s^2]. Their random walk
+#: does not tell them: it is not known how long the IMU was off, nor how warm it was and is, and
+#: being switched on changes them.
+_LOADED_BIAS = (0.01, 0.05)
 #: Errors of map points in the image [rad], which no residual shows.
 _OF_MAP = 1e-3
 #: Squared Mahalanobis distance (6 degrees of freedom) that one pose in a million exceeds.
@@ -387,6 +391,12 @@ class InertialTracker:
         seconds = 1.0 if samples is None else float(samples[-1, 0] - samples[0, 0])
         of_map = np.repeat([_OF_MAP, _OF_MAP * self._depth], 3) ** 2
         return max(1.0, self._limits.common / seconds) * (covariance + np.diag(of_map))
+
+    def map_loaded(self) -> None:
+        """Take the newest biases of a map from a file as what is known before the IMU starts."""
+        bias = self.keyframes.newest_bias
+        if bias is not None:
+            self._bias, self._bias_deviations = bias, _LOADED_BIAS
 
     def reset(self) -> None:
         """Forget all maps; the estimates of the biases stay."""

@@ -78,6 +78,7 @@ def test_a_map_of_another_camera(command: CommandLine, rgbd: Path, tmp_path: Pat
         (["--initial-pose", "0,0,0"], "--initial-pose says where in a map"),
         (["--allow-other-setup"], "--allow-other-setup is about a map that is loaded: --load"),
         (["--save-images"], "--save-images keeps images in the map that is saved: --save FILE"),
+        (["--no-save-patches"], "--no-save-patches leaves patches out of the map that is saved"),
         (["--autosave", "5"], "--autosave needs the file to save to: --save FILE"),
         (["--save", "a.orbmap", "--autosave", "0"], "--autosave must be more than 0 seconds"),
         (["--save", "nowhere/a.orbmap"], "cannot write nowhere/a.orbmap"),
