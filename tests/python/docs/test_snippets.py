@@ -23,7 +23,7 @@ from typing import Any
 import cv2
 import pytest
 
-from orbslam2py.calibration import calibration
+from orbslam2py.calibration.selection import compare_families
 from orbslam2py.cli import main
 from support.command_line import logging_restored
 from support.documentation_data import copy_data, make_data
@@ -81,7 +81,8 @@ def _same_board_searched_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cv2, "findChessboardCornersSB", once(cv2.findChessboardCornersSB))
-        patch.setattr(calibration, "compare_families", once(calibration.compare_families))
+        calibration = "orbslam2py.calibration.calibration"
+        patch.setattr(f"{calibration}.compare_families", once(compare_families))
         yield
 
 
