@@ -15,10 +15,12 @@ from orbslam2py._files import atomic_write
 from orbslam2py.runs import outputs
 from orbslam2py.runs.report_page.markup import Markup
 from orbslam2py.runs.report_page.page import PageKind, whole_page
+from support.bytecode import keep_bytecode
 from support.data import shared_folder
 from support.rendered_once import render_once
 from support.watchdog import watchdog, worker_threads
 
+keep_bytecode()
 # Programs that are started in the background may be told to ignore Ctrl-C, and so is what they
 # start: tests press it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -177,7 +177,8 @@ class _Group(typer.core.TyperGroup):
         """Read the arguments, none of which is empty."""
         if not ctx.resilient_parsing:  # as it is for what a shell completes
             refuse_empty(args)
-        return list(super().parse_args(ctx, args))
+        with hold_while_loading():  # typer loads what converts arguments
+            return list(super().parse_args(ctx, args))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the subcommand, or for a list of commands only its name and summary."""

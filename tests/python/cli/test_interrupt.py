@@ -68,6 +68,15 @@ def lap(original: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
+def slow_lap(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Recorded over 20 s: in real time no run ends before it is interrupted."""
+    options = SyntheticOptions(
+        world="corridor", sensor="rgbd", frames=N, size=(320, 240), fps=1.0, speed=0.1
+    )
+    return SyntheticSequence(options).write(tmp_path_factory.mktemp("slow") / "lap")
+
+
+@pytest.fixture(scope="module")
 def forked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forked]:
     made = Forked(tmp_path_factory.mktemp("forked"))
     yield made
@@ -176,6 +185,27 @@ def test_while_one_library_is_loaded(lap: Path, library: str) -> None:
     assert not (lap.parent / "r").exists(), "nothing was computed"
 
 
+def test_while_arguments_are_read(lap: Path) -> None:
+    """Python drops what is raised in a callback of a weak reference, which each import has."""
+    press = (
+        "import os, signal, weakref, typer.core\n"
+        "read = typer.core.TyperGroup.parse_args\n"
+        "class Lock: pass\n"
+        "def press(_):\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    for _ in range(100): pass\n"  # meanwhile it is handled
+        "def reading(*arguments):\n"
+        "    lock = Lock()\n"
+        "    watched = weakref.ref(lock, press)\n"
+        "    del lock\n"
+        "    return read(*arguments)\n"
+        "typer.core.TyperGroup.parse_args = reading\n"
+    )
+    code, err = finish(start(lap.parent, "time", "ctime", 1, 1, before=press))
+    assert (code, err.strip()) == (130, "")
+    assert not (lap.parent / "r").exists(), "nothing was computed"
+
+
 def open_for_a_reader(pipe: Path) -> int:
     """Open a pipe for writing once somebody reads from it."""
     end = time.monotonic() + 30
@@ -224,16 +254,17 @@ def test_twice_while_writing_gives_up(lap: Path, forked: Forked) -> None:
 
 
 @pytest.mark.parametrize("delay", [0.05, 0.5, 1.2])
-def test_any_moment(lap: Path, delay: float) -> None:
-    process = start(lap.parent, "time", "ctime", 1, 1, "--realtime")
+def test_any_moment(slow_lap: Path, tmp_path: Path, delay: float) -> None:
+    (tmp_path / "lap").symlink_to(slow_lap)
+    process = start(tmp_path, "time", "ctime", 1, 1, "--realtime")
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     code, err = finish(process)
     assert code == 130, err
-    report = lap.parent / "r" / "report.json"
-    assert report.is_file() == (lap.parent / "r").is_dir()
+    report = tmp_path / "r" / "report.json"
+    assert report.is_file() == (tmp_path / "r").is_dir()
 
 
 def test_ignored_in_the_background(lap: Path) -> None:

@@ -10,16 +10,20 @@ import io
 import itertools
 import json
 import os
+import pickle
 import re
 import runpy
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 
+from orbslam2py.calibration.selection import compare_families
 from orbslam2py.cli import main
 from support.command_line import logging_restored
 from support.documentation_data import copy_data, make_data
@@ -56,6 +60,30 @@ def runnable(path: Path) -> list[Block]:
 
 
 WITH_CODE = [path for path in documents() if runnable(path)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _same_board_searched_once() -> Iterator[None]:
+    """Pages calibrate with the same video, which takes seconds: all but the first know the result.
+
+    Kept by all that it depends on: by the pixels of an image, by the corners and the size.
+    """
+    kept: dict[bytes, Any] = {}
+
+    def once(function: Callable[..., Any]) -> Callable[..., Any]:
+        def known(*arguments: Any, **named: Any) -> Any:
+            key = pickle.dumps((function.__name__, arguments, named))
+            if key not in kept:
+                kept[key] = pickle.dumps(function(*arguments, **named))
+            return pickle.loads(kept[key])
+
+        return known
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cv2, "findChessboardCornersSB", once(cv2.findChessboardCornersSB))
+        calibration = "orbslam2py.calibration.calibration"
+        patch.setattr(f"{calibration}.compare_families", once(compare_families))
+        yield
 
 
 @pytest.fixture(scope="session")
