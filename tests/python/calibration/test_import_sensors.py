@@ -68,7 +68,7 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
             KALIBR_PAIR.replace("0.0, -0.11", "0.0, 0.0"),
             {},
             r"yaml: the pair cannot be rectified, because cam0 and cam1 have the same position.*"
-            r"look at T_cn_cnm1, or take one of them with --camera 0",
+            r"check T_cn_cnm1, or take one of them with --camera 0",
         ),
     ],
 )

@@ -103,7 +103,7 @@ def test_two_outputs_of_one_name(command: CommandLine, rgbd: Path) -> None:
     refused(command("run", rgbd, *files), "--video and --save both write a.mp4")
     refused(
         command("run", rgbd, "--output", "r", "--save", "r/trajectory_map0.txt"),
-        "r/trajectory_map0.txt is what one of the run's results is called",
+        "r/trajectory_map0.txt is the name of one of the run's results",
     )
     assert names_in(Path()) == ["lap"]
     assert command("run", rgbd, "--output", "r", "--save", "r/a.orbmap", "--quiet").code == 0
@@ -260,7 +260,7 @@ def test_figures_replace_figures_only(command: CommandLine, finished: Path, rgbd
     )
     assert (finished / "report.json").read_bytes() == report
     Path("list.json").write_text("[1, 2]")
-    refused(command(*arguments, "list.json"), "list.json exists and holds something else")
+    refused(command(*arguments, "list.json"), "list.json exists and does not hold figures of this command")
     assert command(*arguments, "list.json", "--force").code == 0
     Path("figures.json").touch()
     for _ in range(2):

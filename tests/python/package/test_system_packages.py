@@ -116,7 +116,8 @@ def test_the_tests_install_all_they_need_at_once_and_first() -> None:
     )
     installed = re.findall(r"install_system_packages\.sh (.*)", dry.stdout)
     assert set(installed[0].split()) == {section for call in installed for section in call.split()}
-    assert set(installed[0].split()) == {"package", "cpp-tests", "lint", "docs", "browser"}
+    sections = {"package", "cpp-tests", "lint", "docs", "browser", "cameras"}
+    assert set(installed[0].split()) == sections
     assert "install_requirements.py developer" in dry.stdout
 
 

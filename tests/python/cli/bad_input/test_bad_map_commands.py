@@ -109,7 +109,7 @@ EXPORT = "map export colmap a.orbmap out"
         (f"{OPTIMIZE} --fps 3", "serve --align alone", "leave them out"),
         (f"{OPTIMIZE} --align --images folder --time-limit 1", "no time limit", "--time-limit"),
         (f"{OPTIMIZE} --align --images missing", "missing", "does not exist"),
-        (f"{OPTIMIZE} --align --images folder", "folder is no sequence", "give the folder"),
+        (f"{OPTIMIZE} --align --images folder", "folder is no known sequence", "give the folder"),
         (f"{OPTIMIZE} --align --images 99", "99", "camera"),
         ("map export colmap text.orbmap out", "text.orbmap is not a map file", "save_map"),
         ("map export ply a.orbmap nowhere/a.ply", "nowhere", "no such folder"),
