@@ -197,3 +197,33 @@ def test_darkness_on_the_way_leaves_one_upright_map(tmp_path: Any) -> None:
     with System(settings, "rgbd", load_map=saved, deterministic=True) as again:
         assert again.pipeline.back_end.map.is_upright(0)
         assert again.map_contents().upright_roots == (0,)
+
+
+def test_a_state_that_is_off_follows_the_images_again() -> None:
+    """The deviations of a pose do not grow with its distance from the IMU's own prediction."""
+    n, disturbed = 150, 100
+    sequence = SyntheticSequence(
+        SyntheticOptions(
+            world="corridor", sensor="stereo", frames=n, size=(320, 240), imu=True,
+            imu_noise="bmi088",
+        )
+    )  # fmt: skip
+    samples, distances = sequence.imu(), []
+    assert samples is not None
+    settings = sequence.default_settings()
+    with System(settings, "stereo", imu=sequence.imu_settings(), deterministic=True) as slam:
+        tracker, before = slam.pipeline.inertial_tracker, None
+        assert tracker is not None
+        for index, timestamp in enumerate(sequence.timestamps):
+            part = samples.since(before, timestamp)
+            record = slam.track(sequence.load(index), float(timestamp), imu=part)
+            before = timestamp
+            if index == disturbed:
+                assert tracker.filter is not None, "the IMU has started"
+                aside = core.Pose.exp(np.array([0, 0, 0, 0.3, 0, 0]))
+                tracker.filter.move(aside @ tracker.filter.pose()[0])
+            if index >= disturbed and tracker.filter is not None:
+                T_cw = core.Pose.from_matrix(record.T_cw)
+                distances.append(T_cw.difference(tracker.filter.pose()[0])[1])
+    assert distances[0] > 0.2
+    assert max(distances[20:]) < 0.15

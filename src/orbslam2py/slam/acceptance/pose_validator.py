@@ -119,7 +119,8 @@ class PoseValidator:
         grows with the median error of all matches, because the inliers of a wide distribution look
         narrow. Two things that residuals cannot show are added. The map was wrong by as much as
         local bundle adjustment has moved it since the last frame. And with a small probability the
-        prediction is right and the pose is wrong by the whole innovation.
+        prediction is right and the pose is wrong by the whole innovation. A prediction by an IMU
+        has a covariance of its own instead, and is compared with the pose by it.
 
         Parameters
         ----------
@@ -137,12 +138,13 @@ class PoseValidator:
         scale = max(1.0, match_error / limits.expected_error)
         if motion.last_frame is None:
             return scale**2 * robust
+        by_imu = motion.prediction_covariance is not None
         return core.stated_covariance(
             robust,
             scale**2,
             refined.frame,
             motion.last_frame,
-            motion.velocity,
+            None if by_imu else motion.velocity,
             motion.map_motion,
             limits.wrong_share,
         )

@@ -235,9 +235,7 @@ class InertialTracker:
             return False
         if _is_strong(estimate) and not self._leads:
             return False
-        # The stated covariance of a weak pose holds the difference to the prediction itself.
-        covariance = estimate.covariance if _is_strong(estimate) else np.zeros((6, 6))
-        far = self.filter.distance(frame.T_cw, self._of_image(covariance))
+        far = self.filter.distance(frame.T_cw, self._of_image(estimate.covariance))
         return far > _FAR
 
     def tracked(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> None:
