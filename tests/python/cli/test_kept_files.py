@@ -260,7 +260,10 @@ def test_figures_replace_figures_only(command: CommandLine, finished: Path, rgbd
     )
     assert (finished / "report.json").read_bytes() == report
     Path("list.json").write_text("[1, 2]")
-    refused(command(*arguments, "list.json"), "list.json exists and does not hold figures of this command")
+    refused(
+        command(*arguments, "list.json"),
+        "list.json exists and does not hold figures of this command",
+    )
     assert command(*arguments, "list.json", "--force").code == 0
     Path("figures.json").touch()
     for _ in range(2):
