@@ -29,11 +29,7 @@ enum Common { kGyroAt = 0, kAccelAt = 3, kTiltAt = 6, kScaleAt = 8, kCommon = 9 
 
 /// The smallest rotation after which gravity points along -z.
 Eigen::Quaterniond turn_up(const Eigen::Vector3d& gravity) {
-  const Eigen::Vector3d g = gravity.normalized();
-  // The cross product with -z, and one more than the cosine.
-  Eigen::Quaterniond turn(1 - g.z(), -g.y(), g.x(), 0);
-  if (turn.squaredNorm() < 1e-24) turn = Eigen::Quaterniond(0, 1, 0, 0);  // it points along z
-  return turn.normalized();
+  return Eigen::Quaterniond::FromTwoVectors(gravity, Eigen::Vector3d(0, 0, -1)).normalized();
 }
 
 class Problem {

@@ -22,7 +22,7 @@ constexpr double kGap = 0.5, kGapBefore = 3.0;
 constexpr double kRecent = 15.0;
 // Times closer than this are the same [s]; seconds since 1970 are exact to 2e-7.
 constexpr double kSame = 1e-6;
-// Time without a sample [s] at an end of an interval that the nearest one serves for.
+// Longest time [s] from an end of an interval to its nearest sample.
 constexpr double kMissing = 1e-3;
 // Standard deviations [rad/s, m/s^2] of the prior on the bias of the first motion in a chain, which
 // nothing else determines.

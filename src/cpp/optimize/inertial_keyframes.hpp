@@ -24,7 +24,7 @@ struct InertialRows {
   std::vector<double> scale;
   std::vector<ImuBias> bias;
   /// Samples from the row before to this one are [offsets[i], offsets[i + 1]). They cover the time
-  /// from one keyframe to the other, and are none where samples do not join the two.
+  /// from one keyframe to the other. Where samples have a gap there are none.
   std::vector<std::size_t> offsets{0};
   std::vector<ImuSample> samples;
   /// Per row the keyframe, the keyframe of the row before (-1 for none), and the number of the last

@@ -66,7 +66,7 @@ class MapAutosave:
     earlier : SavedMap or MapFile, optional
         The file that the map was loaded from.
     inertial : orbslam2py._core.InertialKeyframes, optional
-        Who has the states of an IMU at keyframes.
+        States of the IMU at the keyframes.
     patches : bool
         Keep the patches of points, and the sightings that were aligned to them.
     """

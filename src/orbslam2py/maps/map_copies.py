@@ -71,7 +71,7 @@ def take_contents(
     slam_map
         The map.
     inertial
-        Who has the states of an IMU at its keyframes; None: nobody.
+        States of the IMU at the keyframes; None without an IMU.
     patches
         Copy the patches of points, and the sightings that were aligned to them.
     """

@@ -119,8 +119,8 @@ class PoseValidator:
         grows with the median error of all matches, because the inliers of a wide distribution look
         narrow. Two things that residuals cannot show are added. The map was wrong by as much as
         local bundle adjustment has moved it since the last frame. And with a small probability the
-        prediction is right and the pose is wrong by the whole innovation. A prediction by an IMU
-        has a covariance of its own instead, and is compared with the pose by it.
+        prediction is right and the pose is wrong by the whole innovation. This term is left out
+        where an IMU predicts: the IMU has its own test of the pose.
 
         Parameters
         ----------
